@@ -1,0 +1,187 @@
+/// \file
+/// The table of backends, and the host side they share: scene data in, id-ordered Eigen data out.
+#include "gpu/backends.hpp"
+
+#include "gpu/device_solver.hpp"
+#include "reference/error.hpp"
+#include "reference/scene.hpp"
+#include "reference/state.hpp"
+
+#include <functional>
+#include <optional>
+
+namespace decant {
+namespace {
+
+using gpu::DeviceSolver;
+
+/// A backend under test is one line here and its query in a file of its own.
+struct Entry {
+  const char* name;
+  std::unique_ptr<DeviceSolver> (*host)();
+  std::unique_ptr<DeviceSolver> (*cuda)();
+};
+
+#if DECANT_HAS_CUDA
+#define DECANT_ENTRY(name) {#name, gpu::host::make_##name, gpu::cuda::make_##name}
+#else
+#define DECANT_ENTRY(name) {#name, gpu::host::make_##name, nullptr}
+#endif
+
+const Entry table[] = {
+    DECANT_ENTRY(brute),
+};
+
+using FloatRows = Eigen::Matrix<float, 3, Eigen::Dynamic>;
+
+std::vector<float> rows_of(const Eigen::Matrix3Xd& m) {
+  const FloatRows rows = m.cast<float>();
+  return {rows.data(), rows.data() + rows.size()};
+}
+
+std::vector<float> values_of(const Eigen::VectorXd& v) {
+  const Eigen::VectorXf values = v.cast<float>();
+  return {values.data(), values.data() + values.size()};
+}
+
+Eigen::Matrix3Xd matrix_of(const std::vector<float>& rows) {
+  return Eigen::Map<const FloatRows>(rows.data(), 3, static_cast<Eigen::Index>(rows.size() / 3))
+      .cast<double>();
+}
+
+Eigen::VectorXd vector_of(const std::vector<float>& values) {
+  return Eigen::Map<const Eigen::VectorXf>(values.data(), static_cast<Eigen::Index>(values.size()))
+      .cast<double>();
+}
+
+IdVector ids_of(const std::vector<std::int64_t>& ids) {
+  return Eigen::Map<const IdVector>(ids.data(), static_cast<Eigen::Index>(ids.size()));
+}
+
+class DeviceBackend : public Backend {
+ public:
+  DeviceBackend(std::string name, Executor executor, std::string options,
+                std::unique_ptr<DeviceSolver> solver)
+      : name_(std::move(name)),
+        executor_(executor),
+        options_(std::move(options)),
+        solver_(std::move(solver)) {}
+
+  BackendInfo info() const override {
+    return {name_, options_, executor_ == Executor::cuda ? "cuda" : "host",
+            executor_device(executor_), "fp32"};
+  }
+
+  void load(const Scene& scene, const Walls& walls, const ParticleState& state) override {
+    scene_ = scene;
+    substep_ = state.substep;
+    gpu::Problem problem{gpu::make_constants(scene), gpu::make_geometry(scene),
+                         gpu::make_wall_samples(scene, walls), rows_of(state.position),
+                         rows_of(state.velocity)};
+    solver_->load(problem);
+  }
+
+  Status evaluate(Fields& out, const StageInputs* given) override {
+    gpu::GivenInputs inputs;
+    if (given)
+      inputs = {values_of(given->boundary_volume), values_of(given->density),
+                values_of(given->pressure)};
+    gpu::HostFields fields;
+    Status status = solver_->evaluate(gpu::make_poses(scene(), substep_, 1), inputs, fields);
+    out.boundary_volume = vector_of(fields.boundary_volume);
+    out.density = vector_of(fields.density);
+    out.pressure = vector_of(fields.pressure);
+    out.pressure_acceleration = matrix_of(fields.pressure_acceleration);
+    out.viscous_acceleration = matrix_of(fields.viscous_acceleration);
+    out.wall_pressure_acceleration = matrix_of(fields.wall_pressure_acceleration);
+    out.wall_viscous_acceleration = matrix_of(fields.wall_viscous_acceleration);
+    out.acceleration = matrix_of(fields.acceleration);
+    out.fluid_neighbor_count = ids_of(fields.fluid_count);
+    out.fluid_neighbor_id_sum = ids_of(fields.fluid_id_sum);
+    out.wall_neighbor_count = ids_of(fields.wall_count);
+    out.wall_neighbor_id_sum = ids_of(fields.wall_id_sum);
+    if (out.fluid_neighbor_count.size() > 0) {
+      stats_.mean_fluid = out.fluid_neighbor_count.cast<double>().mean();
+      stats_.mean_wall = out.wall_neighbor_count.cast<double>().mean();
+    }
+    if (!status.ok()) status.substep += substep_;
+    return status;
+  }
+
+  Status advance(int substeps) override {
+    Status status =
+        solver_->advance(substeps, gpu::make_poses(scene(), substep_, substeps + 1));
+    if (!status.ok()) status.substep += substep_;
+    substep_ += substeps;
+    return status;
+  }
+
+  void read(ParticleState& out) const override {
+    std::vector<float> position, velocity;
+    solver_->read(position, velocity);
+    out.substep = substep_;
+    out.position = matrix_of(position);
+    out.velocity = matrix_of(velocity);
+  }
+
+  StageTimes stage_times() const override { return solver_->stage_times(); }
+  NeighborStats neighbor_stats() const override { return stats_; }
+
+ private:
+  const Scene& scene() const {
+    if (!scene_) throw BackendError(name_ + ": nothing is loaded");
+    return *scene_;
+  }
+
+  std::string name_;
+  Executor executor_;
+  std::string options_;
+  std::unique_ptr<DeviceSolver> solver_;
+  std::optional<Scene> scene_;
+  std::int64_t substep_ = 0;
+  NeighborStats stats_;
+};
+
+}  // namespace
+
+std::vector<std::string> backend_names() {
+  std::vector<std::string> names;
+  for (const Entry& entry : table) names.emplace_back(entry.name);
+  return names;
+}
+
+bool executor_available(Executor executor, std::string* why_not) {
+  if (executor == Executor::host) return true;
+#if DECANT_HAS_CUDA
+  return !gpu::cuda::device(why_not).empty();
+#else
+  if (why_not) *why_not = "built without a CUDA toolkit";
+  return false;
+#endif
+}
+
+std::string executor_device(Executor executor) {
+#if DECANT_HAS_CUDA
+  if (executor == Executor::cuda) return gpu::cuda::device(nullptr);
+#endif
+  return executor == Executor::host ? gpu::host::device() : std::string();
+}
+
+std::unique_ptr<Backend> make_backend(std::string_view name, Executor executor,
+                                      const std::string& options) {
+  for (const Entry& entry : table) {
+    if (name != entry.name) continue;
+    if (!options.empty())
+      throw InputError("--backend", std::string(name), options, "this backend takes no options");
+    std::string why_not;
+    if (!executor_available(executor, &why_not))
+      throw BackendError("executor cuda: " + why_not);
+    const auto make = executor == Executor::host ? entry.host : entry.cuda;
+    return std::make_unique<DeviceBackend>(entry.name, executor, options, make());
+  }
+  std::string known;
+  for (const Entry& entry : table) known += (known.empty() ? "" : ", ") + std::string(entry.name);
+  throw InputError("--backend", "name", std::string(name), "known: reference, " + known);
+}
+
+}  // namespace decant

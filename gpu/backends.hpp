@@ -1,0 +1,30 @@
+/// \file
+/// The table of backends under test.
+#pragma once
+
+#include "oracle/backend.hpp"
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace decant {
+
+enum class Executor { host, cuda };
+
+/// Names in the table: "brute", …
+std::vector<std::string> backend_names();
+
+/// Whether this build has the executor and this machine a device for it; `why_not` says what is
+/// missing, in a few words.
+bool executor_available(Executor executor, std::string* why_not = nullptr);
+
+/// What the executor runs on: "NVIDIA H200, driver 13.0, sm_90" or "8 OpenMP threads".
+std::string executor_device(Executor executor);
+
+/// Throws InputError for an unknown name or option, BackendError where the executor is missing.
+std::unique_ptr<Backend> make_backend(std::string_view name, Executor executor,
+                                      const std::string& options = {});
+
+}  // namespace decant

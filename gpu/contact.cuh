@@ -1,0 +1,139 @@
+/// \file
+/// Distance to a container's solid and the push out of it, in fp32, written apart from the oracle's.
+#pragma once
+
+#include "gpu/physics.cuh"
+
+namespace decant::gpu::DECANT_EXECUTOR {
+
+/// All containers' shapes in device memory.
+struct DeviceGeometry {
+  int containers;
+  const Shape* shapes;
+  const Edge* edges;
+  const Box* boxes;
+  const Face* faces;
+};
+
+/// Signed distance (m, positive outside) and its gradient, container frame.
+struct Clearance {
+  float distance;
+  Float3 normal;
+};
+
+DECANT_DEVICE float clamp01(float s) { return fminf(fmaxf(s, 0.0f), 1.0f); }
+
+DECANT_DEVICE Clearance revolved_clearance(const Edge* edges, int count, Float3 x) {
+  const float r = sqrtf(x.x * x.x + x.y * x.y), z = x.z;
+  float best = 3.0e38f, away_r = 0.0f, away_z = 0.0f, face_r = 0.0f, face_z = 0.0f;
+  bool inside = false;
+  for (int k = 0; k < count; ++k) {
+    const Edge e = edges[k];
+    const float er = e.r1 - e.r0, ez = e.z1 - e.z0;
+    const float pr = r - e.r0, pz = z - e.z0;
+    const float s = clamp01((pr * er + pz * ez) / (er * er + ez * ez));
+    const float ar = pr - s * er, az = pz - s * ez;
+    const float squared = ar * ar + az * az;
+    if (squared < best) {
+      best = squared;
+      away_r = ar;
+      away_z = az;
+      face_r = ez;  // the solid is on the left, so outward is right
+      face_z = -er;
+    }
+    // Even–odd count of the outline beyond r at this height.
+    if ((e.z0 > z) != (e.z1 > z) && r < e.r0 + pz / ez * er) inside = !inside;
+  }
+  const float d = sqrtf(best), sign = inside ? -1.0f : 1.0f;
+  float nr, nz;
+  if (d > 1e-6f * (r + fabsf(z))) {
+    nr = sign * away_r / d;
+    nz = sign * away_z / d;
+  } else {
+    const float length = sqrtf(face_r * face_r + face_z * face_z);
+    nr = face_r / length;
+    nz = face_z / length;
+  }
+  const float cosine = r > 0.0f ? x.x / r : 1.0f, sine = r > 0.0f ? x.y / r : 0.0f;
+  return {sign * d, {nr * cosine, nr * sine, nz}};
+}
+
+DECANT_DEVICE Clearance box_clearance(const DeviceGeometry& g, const Shape& shape, Float3 x) {
+  float best = 3.0e38f;
+  Float3 away{0, 0, 0};
+  Face nearest{};
+  for (int k = 0; k < shape.faces; ++k) {
+    const Face f = g.faces[shape.first_face + k];
+    const Float3 to_x{x.x - fminf(fmaxf(x.x, f.min.x), f.max.x),
+                      x.y - fminf(fmaxf(x.y, f.min.y), f.max.y),
+                      x.z - fminf(fmaxf(x.z, f.min.z), f.max.z)};
+    if (dot(to_x, to_x) < best) {
+      best = dot(to_x, to_x);
+      away = to_x;
+      nearest = f;
+    }
+  }
+  bool inside = false;
+  for (int k = 0; k < shape.boxes; ++k) {
+    const Box b = g.boxes[shape.first_box + k];
+    inside = inside || (x.x >= b.min.x && x.x <= b.max.x && x.y >= b.min.y && x.y <= b.max.y &&
+                        x.z >= b.min.z && x.z <= b.max.z);
+  }
+  const float d = sqrtf(best), sign = inside ? -1.0f : 1.0f;
+  if (d > 1e-6f * (fabsf(x.x) + fabsf(x.y) + fabsf(x.z))) return {sign * d, (sign / d) * away};
+  const float side = static_cast<float>(nearest.side);
+  return {sign * d,
+          {nearest.axis == 0 ? side : 0.0f, nearest.axis == 1 ? side : 0.0f,
+           nearest.axis == 2 ? side : 0.0f}};
+}
+
+/// R x and Rᵀ x.
+DECANT_DEVICE Float3 rotate(const DevicePose& p, Float3 x) {
+  return {p.R[0] * x.x + p.R[1] * x.y + p.R[2] * x.z, p.R[3] * x.x + p.R[4] * x.y + p.R[5] * x.z,
+          p.R[6] * x.x + p.R[7] * x.y + p.R[8] * x.z};
+}
+DECANT_DEVICE Float3 rotate_back(const DevicePose& p, Float3 x) {
+  return {p.R[0] * x.x + p.R[3] * x.y + p.R[6] * x.z, p.R[1] * x.x + p.R[4] * x.y + p.R[7] * x.z,
+          p.R[2] * x.x + p.R[5] * x.y + p.R[8] * x.z};
+}
+
+/// Moves x to the contact distance and takes the approaching part of the relative velocity:
+/// with j = (1 + e)|w·n|, normal part += j n, tangential part × max(0, 1 − f j/|w_t|).
+DECANT_DEVICE void respond(const Constants& c, Float3 normal, float gap, const DevicePose* pose,
+                           Float3& x, Float3& v) {
+  x = x + (c.contact_distance - gap) * normal;
+  const Float3 v_wall = pose ? cross(pose->omega, x - pose->pivot) : Float3{0, 0, 0};
+  const Float3 w = v - v_wall;
+  const float approach = dot(w, normal);
+  if (!(approach < 0.0f)) return;
+  const float impulse = -(1.0f + c.restitution) * approach;
+  const Float3 tangential = w - approach * normal;
+  const float slip = sqrtf(dot(tangential, tangential));
+  const float keep = slip > 0.0f ? fmaxf(0.0f, 1.0f - c.friction * impulse / slip) : 0.0f;
+  v = v_wall + (approach + impulse) * normal + keep * tangential;
+}
+
+/// All containers in turn, then the floor, as they stand at the end of the substep.
+DECANT_DEVICE void collide(const Constants& c, const DeviceGeometry& g, const DevicePose* poses,
+                           Float3& x, Float3& v) {
+  const float reach = c.contact_distance;
+  for (int k = 0; k < g.containers; ++k) {
+    const Shape shape = g.shapes[k];
+    for (int projection = 0; projection < 2; ++projection) {
+      const Float3 local = rotate_back(poses[k], x - poses[k].translation);
+      if (local.x < shape.low.x - reach || local.x > shape.high.x + reach ||
+          local.y < shape.low.y - reach || local.y > shape.high.y + reach ||
+          local.z < shape.low.z - reach || local.z > shape.high.z + reach)
+        break;
+      const Clearance near = shape.revolved
+                                 ? revolved_clearance(g.edges + shape.first_edge, shape.edges, local)
+                                 : box_clearance(g, shape, local);
+      if (!(near.distance < reach)) break;
+      respond(c, rotate(poses[k], near.normal), near.distance, &poses[k], x, v);
+    }
+  }
+  if (c.has_floor && x.z - c.floor_height < reach)
+    respond(c, {0, 0, 1}, x.z - c.floor_height, nullptr, x, v);
+}
+
+}  // namespace decant::gpu::DECANT_EXECUTOR

@@ -1,0 +1,71 @@
+/// \file
+/// The interface every solver under test offers, the oracle's own adapter included. No Eigen here,
+/// so that device code can include it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+namespace decant {
+
+struct Scene;
+struct Walls;
+struct ParticleState;
+struct Fields;
+struct StageInputs;
+
+struct BackendInfo {
+  std::string name;       // "brute"
+  std::string options;    // as given on the command line; empty: defaults
+  std::string executor;   // "reference", "host" or "cuda"
+  std::string device;     // what the executor runs on
+  std::string precision;  // "fp32" or "fp64"
+};
+
+/// Trouble met on the way. A status that is not ok makes every result of the backend unusable.
+struct Status {
+  enum Bit : std::uint32_t { non_finite = 1, escaped = 2, capacity = 4 };
+  std::uint32_t bits = 0;
+  std::int64_t particle = -1;  // smallest id concerned
+  std::int64_t substep = -1;   // first substep it was seen after
+
+  bool ok() const { return bits == 0; }
+};
+
+/// "non-finite value, particle 17, substep 2041"; "ok" without trouble.
+std::string describe(const Status& status);
+
+/// Seconds spent and number of passes, per stage of a substep, since `load`.
+struct StageTimes {
+  struct Stage {
+    double seconds = 0;
+    std::int64_t calls = 0;
+  };
+  Stage build, density, force, integrate;
+};
+
+struct NeighborStats {
+  std::int64_t rebuilds = 0;
+  double mean_fluid = 0, mean_wall = 0;  // neighbors a particle at the last evaluation
+};
+
+class Backend {
+ public:
+  virtual ~Backend() = default;
+  virtual BackendInfo info() const = 0;
+  /// Takes scene, wall particles and state; may allocate. May be called again.
+  virtual void load(const Scene&, const Walls&, const ParticleState&) = 0;
+  /// Fields at the loaded or advanced state, which stays as it is. `out` arrives as
+  /// Fields::unwritten. Where `given` holds a stage's inputs, later stages use those.
+  [[nodiscard]] virtual Status evaluate(Fields& out, const StageInputs* given = nullptr) = 0;
+  /// `substeps` × dt onward.
+  [[nodiscard]] virtual Status advance(int substeps) = 0;
+  /// State in id order.
+  virtual void read(ParticleState& out) const = 0;
+  virtual StageTimes stage_times() const = 0;
+  virtual NeighborStats neighbor_stats() const = 0;
+};
+
+}  // namespace decant

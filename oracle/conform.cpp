@@ -1,0 +1,295 @@
+/// \file
+/// Comparison of a backend's fields with the oracle's. Every comparison is written so that NaN fails.
+#include "oracle/conform.hpp"
+
+#include "reference/error.hpp"
+#include "reference/sampling.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <limits>
+
+#if __FINITE_MATH_ONLY__
+#error "compiled with -ffinite-math-only a comparator cannot see NaN"
+#endif
+
+namespace decant {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+/// Error over tolerance; a tolerance of 0 asks for equality.
+double score_of(double error, double tolerance) {
+  if (error == 0) return 0;
+  const double score = error / tolerance;
+  return score >= 0 ? score : infinity;  // NaN, whatever made it
+}
+
+/// Values of one field, particle by particle, `components` a particle.
+struct Values {
+  Eigen::VectorXd got, expected, tolerance;
+  Eigen::VectorXd float_value;  // empty: no fp32 counterpart
+  int components = 1;
+  const std::vector<bool>* excluded = nullptr;
+  std::int64_t most_excluded = 0;
+};
+
+template <class Matrix>
+Eigen::VectorXd flat(const Matrix& m) {
+  return Eigen::Map<const Eigen::Matrix<typename Matrix::Scalar, Eigen::Dynamic, 1>>(m.data(),
+                                                                                     m.size())
+      .template cast<double>();
+}
+
+void compare(const Values& v, CheckRow& row) {
+  const auto n = v.expected.size();
+  if (v.got.size() != n) {
+    row.verdict = Verdict::fail;
+    row.score = infinity;
+    row.reason = "has " + std::to_string(v.got.size()) + " values, not " + std::to_string(n);
+    return;
+  }
+  row.error = (v.got - v.expected).cwiseAbs();
+  row.tolerances = v.tolerance;
+  std::vector<double> scores;
+  double worst = -1, float_worst = v.float_value.size() ? 0 : std::nan("");
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const auto particle = static_cast<std::size_t>(k / v.components);
+    if (v.excluded && (*v.excluded)[particle]) {
+      if (k % v.components == 0) ++row.excluded;
+      row.error[k] = 0;
+      continue;
+    }
+    const double score = score_of(row.error[k], v.tolerance[k]);
+    scores.push_back(score);
+    if (score > worst) {
+      worst = score;
+      row.value = row.error[k];
+      row.tolerance = v.tolerance[k];
+      row.worst_id = static_cast<std::int64_t>(particle);
+    }
+    if (v.float_value.size())
+      float_worst = std::max(
+          float_worst, score_of(std::abs(v.float_value[k] - v.expected[k]), v.tolerance[k]));
+  }
+  row.n = static_cast<std::int64_t>(scores.size());
+  row.score = std::max(worst, 0.0);
+  row.float_score = float_worst;
+  if (!scores.empty()) {
+    auto middle = scores.begin() + static_cast<std::ptrdiff_t>(scores.size() / 2);
+    std::nth_element(scores.begin(), middle, scores.end());
+    row.median_score = *middle;
+  }
+  row.verdict = row.score <= 1 ? Verdict::pass : Verdict::fail;
+  if (row.verdict == Verdict::fail) row.reason = "beyond tolerance";
+  if (v.excluded && !(row.excluded <= v.most_excluded)) {
+    row.verdict = Verdict::fail;
+    row.reason = std::to_string(row.excluded) + " ambiguous particles, at most " +
+                 std::to_string(v.most_excluded) + " expected";
+  }
+}
+
+/// Rows of one backend on one fixture, in order.
+class Sheet {
+ public:
+  Sheet(const Backend& backend, const Fixture& fixture) {
+    const BackendInfo info = backend.info();
+    common_.backend = info.name;
+    common_.options = info.options;
+    common_.executor = info.executor;
+    common_.device = info.device;
+    common_.fixture = fixture.name;
+  }
+
+  CheckRow& row(const char* check, const char* field, const char* unit) {
+    CheckRow& row = rows_.emplace_back(common_);
+    row.check = check;
+    row.field = field;
+    row.unit = unit;
+    row.float_score = std::nan("");
+    return row;
+  }
+
+  void failed(const char* check, const std::string& why) {
+    CheckRow& r = row(check, "all", "");
+    r.verdict = Verdict::fail;
+    r.score = infinity;
+    r.reason = why;
+  }
+
+  std::vector<CheckRow> take() { return std::move(rows_); }
+
+ private:
+  CheckRow common_;
+  std::vector<CheckRow> rows_;
+};
+
+struct AccelerationField {
+  const char* name;
+  Eigen::Matrix3Xd Fields::*member;
+};
+constexpr AccelerationField accelerations[] = {
+    {"pressure_acceleration", &Fields::pressure_acceleration},
+    {"viscous_acceleration", &Fields::viscous_acceleration},
+    {"wall_pressure_acceleration", &Fields::wall_pressure_acceleration},
+    {"wall_viscous_acceleration", &Fields::wall_viscous_acceleration},
+    {"acceleration", &Fields::acceleration},
+};
+
+void judge_accelerations(const char* check, const Fields& got, const OracleAnswer& oracle,
+                         const Fields& in_float, Sheet& sheet) {
+  for (const auto& field : accelerations)
+    compare({flat(got.*field.member), flat(oracle.fields.*field.member),
+             flat(oracle.tolerance.*field.member), flat(in_float.*field.member), 3, nullptr, 0},
+            sheet.row(check, field.name, "m/s^2"));
+}
+
+void judge_neighbors(const Fields& got, const OracleAnswer& oracle, Sheet& sheet) {
+  struct Fact {
+    const char* name;
+    IdVector Fields::*member;
+    const std::vector<bool>* ambiguous;
+    std::int64_t most;
+  };
+  const Fact facts[] = {
+      {"fluid_neighbor_count", &Fields::fluid_neighbor_count, &oracle.fluid_ambiguous,
+       oracle.most_fluid_ambiguous},
+      {"fluid_neighbor_id_sum", &Fields::fluid_neighbor_id_sum, &oracle.fluid_ambiguous,
+       oracle.most_fluid_ambiguous},
+      {"wall_neighbor_count", &Fields::wall_neighbor_count, &oracle.wall_ambiguous,
+       oracle.most_wall_ambiguous},
+      {"wall_neighbor_id_sum", &Fields::wall_neighbor_id_sum, &oracle.wall_ambiguous,
+       oracle.most_wall_ambiguous},
+  };
+  for (const Fact& fact : facts) {
+    const Eigen::VectorXd expected = flat(oracle.fields.*fact.member);
+    compare({flat(got.*fact.member), expected, Eigen::VectorXd::Zero(expected.size()), {}, 1,
+             fact.ambiguous, fact.most},
+            sheet.row("neighbors", fact.name, "1"));
+  }
+}
+
+void judge_fields(Backend& backend, const Judgement& oracle, Sheet& sheet) {
+  const auto n = oracle.own.fields.density.size(), m = oracle.own.fields.boundary_volume.size();
+  Fields got = Fields::unwritten(n, m);
+  if (const Status status = backend.evaluate(got); !status.ok())
+    return sheet.failed("evaluation", describe(status));
+  const auto scalar = [&](const char* name, Eigen::VectorXd Fields::*member, const char* unit) {
+    compare({got.*member, oracle.own.fields.*member, oracle.own.tolerance.*member,
+             oracle.own_float.*member, 1, nullptr, 0},
+            sheet.row(name, name, unit));
+  };
+  judge_neighbors(got, oracle.own, sheet);
+  scalar("boundary_volume", &Fields::boundary_volume, "m^3");
+  scalar("density", &Fields::density, "kg/m^3");
+  scalar("pressure", &Fields::pressure, "Pa");
+
+  Fields staged = Fields::unwritten(n, m);
+  if (const Status status = backend.evaluate(staged, &oracle.inputs); !status.ok())
+    return sheet.failed("acceleration", describe(status));
+  judge_accelerations("acceleration", staged, oracle.given, oracle.given_float, sheet);
+  judge_accelerations("evaluation", got, oracle.own, oracle.own_float, sheet);
+}
+
+void judge_substep(Backend& backend, const Judgement& oracle, Sheet& sheet) {
+  if (const Status status = backend.advance(1); !status.ok())
+    return sheet.failed("substep", describe(status));
+  ParticleState got;
+  backend.read(got);
+  const SubstepAnswer& answer = oracle.substep;
+  compare({flat(got.position), flat(answer.state.position), flat(answer.position_tolerance), {}, 3,
+           &answer.ambiguous, answer.most_ambiguous},
+          sheet.row("substep", "position", "m"));
+  compare({flat(got.velocity), flat(answer.state.velocity), flat(answer.velocity_tolerance), {}, 3,
+           &answer.ambiguous, answer.most_ambiguous},
+          sheet.row("substep", "velocity", "m/s"));
+}
+
+/// Recorded against recomputed, both in double: only the last bits may differ between compilers.
+void require_reproduced(const Fixture& fixture, const std::string& name,
+                        const Eigen::VectorXd& recorded, const Eigen::VectorXd& today,
+                        const Eigen::VectorXd& tolerance) {
+  for (Eigen::Index k = 0; k < today.size(); ++k) {
+    const double bound = 0x1p-29 * tolerance[k];
+    if (std::abs(recorded[k] - today[k]) <= bound) continue;
+    throw InputError(fixture.name, name + "[" + std::to_string(k) + "]",
+                     fmt::format("{:.17g}", recorded[k]),
+                     fmt::format("this build's reference gives {:.17g} ± {:.2g}; record the "
+                                 "fixture anew if that is intended",
+                                 today[k], bound));
+  }
+}
+
+void require_reproduced(const Fixture& fixture, const OracleAnswer& today) {
+  if (fixture.fields) {
+    const Fields& recorded = *fixture.fields;
+    const auto check = [&](const char* name, const auto& then, const auto& now, const auto& bound) {
+      require_reproduced(fixture, name, flat(then), flat(now), flat(bound));
+    };
+    check("boundary_volume", recorded.boundary_volume, today.fields.boundary_volume,
+          today.tolerance.boundary_volume);
+    check("density", recorded.density, today.fields.density, today.tolerance.density);
+    check("pressure", recorded.pressure, today.fields.pressure, today.tolerance.pressure);
+    for (const auto& field : accelerations)
+      check(field.name, recorded.*field.member, today.fields.*field.member,
+            today.tolerance.*field.member);
+    for (auto member : {&Fields::fluid_neighbor_count, &Fields::fluid_neighbor_id_sum,
+                        &Fields::wall_neighbor_count, &Fields::wall_neighbor_id_sum})
+      check("neighbors", recorded.*member, today.fields.*member, today.tolerance.*member);
+    return;
+  }
+  const auto sampled = [&](const Eigen::VectorXd& all) {
+    return Eigen::VectorXd(all(fixture.sample_id.cast<Eigen::Index>()));
+  };
+  const auto sampled3 = [&](const Eigen::Matrix3Xd& all) {
+    return Eigen::Matrix3Xd(all(Eigen::all, fixture.sample_id.cast<Eigen::Index>()));
+  };
+  require_reproduced(fixture, "sample density", fixture.sample_density,
+                     sampled(today.fields.density), sampled(today.tolerance.density));
+  require_reproduced(fixture, "sample pressure", fixture.sample_pressure,
+                     sampled(today.fields.pressure), sampled(today.tolerance.pressure));
+  require_reproduced(fixture, "sample acceleration", flat(fixture.sample_acceleration),
+                     flat(sampled3(today.fields.acceleration)),
+                     flat(sampled3(today.tolerance.acceleration)));
+}
+
+}  // namespace
+
+void evaluate_oracle(const Scene& scene, const ParticleState& state, Fields& fields,
+                     ConditionSums& condition) {
+  OracleAnswer a = answer(scene, sample_walls(scene), state);
+  fields = std::move(a.fields);
+  condition = std::move(a.condition);
+}
+
+Judgement prepare(const Fixture& fixture) {
+  const Scene& scene = fixture.scene;
+  Judgement j;
+  j.walls = sample_walls(scene);
+  j.own = answer(scene, j.walls, fixture.state);
+  require_reproduced(fixture, j.own);
+  j.inputs.density = j.own.fields.density.cast<float>().cast<double>();
+  j.inputs.pressure = j.own.fields.pressure.cast<float>().cast<double>();
+  j.given = answer(scene, j.walls, fixture.state, &j.inputs);
+  j.own_float = float_fields(scene, j.walls, fixture.state);
+  j.given_float = float_fields(scene, j.walls, fixture.state, &j.inputs);
+  j.substep = substep_answer(scene, fixture.state, j.own);
+  return j;
+}
+
+std::vector<CheckRow> judge(Backend& backend, const Fixture& fixture, const Judgement& oracle) {
+  Sheet sheet(backend, fixture);
+  try {
+    backend.load(fixture.scene, oracle.walls, fixture.state);
+    judge_fields(backend, oracle, sheet);
+    judge_substep(backend, oracle, sheet);
+  } catch (const std::exception& error) {
+    sheet.failed("run", error.what());
+  }
+  return sheet.take();
+}
+
+}  // namespace decant

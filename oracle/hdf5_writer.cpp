@@ -1,0 +1,258 @@
+/// \file
+/// Writing: the same content gives the same bytes, and a file stands under its name whole or not at
+/// all.
+#include "oracle/hdf5_handle.hpp"
+#include "oracle/hdf5_io.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <stdexcept>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+namespace decant {
+namespace {
+
+constexpr hsize_t values_per_chunk = 65536;
+constexpr std::size_t memory_step = 1 << 22;  // bytes the image grows by
+
+/// Fixed-length UTF-8 of `size` bytes.
+Handle utf8_type(std::size_t size) {
+  Handle type(H5Tcopy(H5T_C_S1));
+  H5Tset_size(type.get(), size);
+  H5Tset_cset(type.get(), H5T_CSET_UTF8);
+  H5Tset_strpad(type.get(), H5T_STR_NULLPAD);
+  return type;
+}
+
+/// Links whose missing groups are made.
+Handle making_groups() {
+  Handle links(H5Pcreate(H5P_LINK_CREATE));
+  H5Pset_create_intermediate_group(links.get(), 1);
+  return links;
+}
+
+bool exists(hid_t file, const std::string& path) {
+  for (std::size_t end = 0; end != std::string::npos && path != "/";) {
+    end = path.find('/', end + 1);
+    if (!(H5Lexists(file, path.substr(0, end).c_str(), H5P_DEFAULT) > 0)) return false;
+  }
+  return true;
+}
+
+/// Writes all bytes; false, with errno, where the system refuses.
+bool write_all(int descriptor, const char* bytes, std::size_t size) {
+  while (size > 0) {
+    const ssize_t written = ::write(descriptor, bytes, size);
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) return false;
+    bytes += written;
+    size -= static_cast<std::size_t>(written);
+  }
+  return true;
+}
+
+std::filesystem::path temporary_beside(const std::filesystem::path& file) {
+  static std::atomic<int> counter{0};
+  return file.parent_path() /
+         fmt::format(".{}.{}-{}.tmp", file.filename().string(), ::getpid(), counter.fetch_add(1));
+}
+
+}  // namespace
+
+struct Hdf5Writer::Layout {
+  hid_t file_type, memory_type;
+  std::vector<hsize_t> dims;
+};
+
+Hdf5Writer::Hdf5Writer(std::filesystem::path file, int level)
+    : file_(std::move(file)), temporary_(temporary_beside(file_)), level_(level) {
+  silence_hdf5();
+  if (file_.filename().empty() || std::filesystem::is_directory(file_))
+    throw std::runtime_error(file_.string() + ": is a folder, a file is to be written");
+  // Opened now, so that a place that cannot be written is known before the work.
+  descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (descriptor_ < 0)
+    throw std::runtime_error(
+        fmt::format("{}: cannot be written: {}", file_.string(), std::strerror(errno)));
+  // In memory until commit: HDF5 1.10 crashes when a disk is full.
+  const Handle access(H5Pcreate(H5P_FILE_ACCESS));
+  H5Pset_fapl_core(access.get(), memory_step, false);
+  id_ = H5Fcreate(temporary_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access.get());
+  if (id_ < 0) {
+    discard();
+    fail("file", hdf5_message());
+  }
+}
+
+Hdf5Writer::~Hdf5Writer() { discard(); }
+
+void Hdf5Writer::discard() {
+  if (id_ >= 0) H5Fclose(std::exchange(id_, -1));
+  if (descriptor_ >= 0) ::close(std::exchange(descriptor_, -1));
+  std::error_code ignored;
+  if (!temporary_.empty()) std::filesystem::remove(temporary_, ignored);
+  temporary_.clear();
+}
+
+void Hdf5Writer::fail(const std::string& object, const std::string& what) const {
+  throw std::runtime_error(
+      fmt::format("{}: {}: cannot be written: {}", file_.string(), object, what));
+}
+
+void Hdf5Writer::dataset(const std::string& path, const Layout& layout, const void* values,
+                         std::string_view unit, std::string_view description) {
+  const auto& dims = layout.dims;
+  const Handle space(dims.empty()
+                         ? H5Screate(H5S_SCALAR)
+                         : H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr));
+  const bool holds_values = std::find(dims.begin(), dims.end(), hsize_t{0}) == dims.end();
+  const Handle creation(H5Pcreate(H5P_DATASET_CREATE));
+  // A time of writing would make equal content differ.
+  H5Pset_obj_track_times(creation.get(), false);
+  if (holds_values && !dims.empty() && level_ > 0) {
+    std::vector<hsize_t> chunk = dims;
+    chunk[0] = std::min(dims[0], values_per_chunk / (dims.size() > 1 ? dims[1] : 1));
+    H5Pset_chunk(creation.get(), static_cast<int>(chunk.size()), chunk.data());
+    H5Pset_shuffle(creation.get());
+    H5Pset_deflate(creation.get(), static_cast<unsigned>(level_));
+  }
+  const Handle links = making_groups();
+  const Handle data(H5Dcreate2(id_, path.c_str(), layout.file_type, space.get(), links.get(),
+                               creation.get(), H5P_DEFAULT));
+  if (!data) fail(path, hdf5_message());
+  if (holds_values &&
+      H5Dwrite(data.get(), layout.memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0)
+    fail(path, hdf5_message());
+  if (!unit.empty()) attribute(path, "unit", unit);
+  if (!description.empty()) attribute(path, "description", description);
+}
+
+void Hdf5Writer::vector(const std::string& path, const Eigen::VectorXd& values,
+                        std::string_view unit, std::string_view description, Storage storage) {
+  const std::vector<hsize_t> dims = {static_cast<hsize_t>(values.size())};
+  if (storage == Storage::fp64)
+    return dataset(path, {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, dims}, values.data(), unit,
+                   description);
+  const Eigen::VectorXf single = values.cast<float>();
+  dataset(path, {H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, dims}, single.data(), unit, description);
+}
+
+void Hdf5Writer::matrix3(const std::string& path, const Eigen::Matrix3Xd& values,
+                         std::string_view unit, std::string_view description, Storage storage) {
+  const std::vector<hsize_t> dims = {static_cast<hsize_t>(values.cols()), 3};
+  if (storage == Storage::fp64)
+    return dataset(path, {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, dims}, values.data(), unit,
+                   description);
+  const Eigen::Matrix3Xf single = values.cast<float>();
+  dataset(path, {H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, dims}, single.data(), unit, description);
+}
+
+void Hdf5Writer::integers(const std::string& path, const IdVector& values,
+                          std::string_view description) {
+  dataset(path, {H5T_STD_I64LE, H5T_NATIVE_INT64, {static_cast<hsize_t>(values.size())}},
+          values.data(), {}, description);
+}
+
+void Hdf5Writer::bytes(const std::string& path, const std::vector<std::uint8_t>& values,
+                       std::string_view description) {
+  dataset(path, {H5T_STD_U8LE, H5T_NATIVE_UINT8, {values.size()}}, values.data(), {}, description);
+}
+
+void Hdf5Writer::strings(const std::string& path, const std::vector<std::string>& values,
+                         std::string_view description) {
+  std::size_t size = 1;
+  for (const auto& value : values) {
+    if (value.find('\0') != std::string::npos) fail(path, "a string holds NUL");
+    size = std::max(size, value.size());
+  }
+  std::vector<char> padded(values.size() * size, '\0');
+  for (std::size_t k = 0; k < values.size(); ++k)
+    std::copy(values[k].begin(), values[k].end(),
+              padded.begin() + static_cast<std::ptrdiff_t>(k * size));
+  const Handle type = utf8_type(size);
+  dataset(path, {type.get(), type.get(), {values.size()}}, padded.data(), {}, description);
+}
+
+void Hdf5Writer::text(const std::string& path, std::string_view text,
+                      std::string_view description) {
+  if (text.find('\0') != std::string_view::npos) fail(path, "a string holds NUL");
+  const std::string whole = text.empty() ? std::string(1, '\0') : std::string(text);
+  const Handle type = utf8_type(whole.size());
+  dataset(path, {type.get(), type.get(), {}}, whole.data(), {}, description);
+}
+
+void Hdf5Writer::group(const std::string& path) {
+  if (exists(id_, path)) return;
+  const Handle links = making_groups();
+  if (!Handle(H5Gcreate2(id_, path.c_str(), links.get(), H5P_DEFAULT, H5P_DEFAULT)))
+    fail(path, hdf5_message());
+}
+
+namespace {
+
+/// Writes one scalar attribute of what stands at a path; false where HDF5 refuses.
+bool write_attribute(hid_t file, const std::string& object, const std::string& name, hid_t type,
+                     hid_t memory, const void* value) {
+  const Handle owner(H5Oopen(file, object.c_str(), H5P_DEFAULT));
+  const Handle space(H5Screate(H5S_SCALAR));
+  if (!owner) return false;
+  const Handle attribute(
+      H5Acreate2(owner.get(), name.c_str(), type, space.get(), H5P_DEFAULT, H5P_DEFAULT));
+  return attribute && H5Awrite(attribute.get(), memory, value) >= 0;
+}
+
+}  // namespace
+
+void Hdf5Writer::attribute(const std::string& object, const std::string& name,
+                           std::string_view text) {
+  const std::string whole = text.empty() ? std::string(1, '\0') : std::string(text);
+  if (text.find('\0') != std::string_view::npos) fail(object + "@" + name, "a string holds NUL");
+  const Handle type = utf8_type(whole.size());
+  group(object);
+  if (!write_attribute(id_, object, name, type.get(), type.get(), whole.data()))
+    fail(object + "@" + name, hdf5_message());
+}
+
+void Hdf5Writer::attribute(const std::string& object, const std::string& name, double value) {
+  group(object);
+  if (!write_attribute(id_, object, name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, &value))
+    fail(object + "@" + name, hdf5_message());
+}
+
+void Hdf5Writer::attribute(const std::string& object, const std::string& name, std::int64_t value) {
+  group(object);
+  if (!write_attribute(id_, object, name, H5T_STD_I64LE, H5T_NATIVE_INT64, &value))
+    fail(object + "@" + name, hdf5_message());
+}
+
+void Hdf5Writer::commit() {
+  const ssize_t size =
+      H5Fflush(id_, H5F_SCOPE_GLOBAL) < 0 ? -1 : H5Fget_file_image(id_, nullptr, 0);
+  if (size < 0) fail("file", hdf5_message());
+  std::vector<char> image(static_cast<std::size_t>(size));
+  if (H5Fget_file_image(id_, image.data(), image.size()) != size) fail("file", hdf5_message());
+  if (!write_all(descriptor_, image.data(), image.size()) || ::fsync(descriptor_) != 0 ||
+      ::close(std::exchange(descriptor_, -1)) != 0)
+    fail("file", std::strerror(errno));
+  std::error_code error;
+  std::filesystem::rename(temporary_, file_, error);
+  if (error) fail("file", error.message());
+  temporary_.clear();
+  discard();
+
+  // The file is whole either way, and some file systems refuse to sync a folder.
+  const auto folder = file_.parent_path();
+  const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor >= 0) {
+    ::fsync(descriptor);
+    ::close(descriptor);
+  }
+}
+
+}  // namespace decant

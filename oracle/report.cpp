@@ -1,0 +1,258 @@
+/// \file
+/// The report's verdicts and its file.
+#include "oracle/report.hpp"
+
+#include "oracle/hdf5_io.hpp"
+#include "reference/error.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace decant {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+// Bytes that whole arrays may take in a report, and then how many rows keep how many worst values:
+// with the summary of some thousand rows the file stays below 15 MB.
+constexpr std::int64_t whole_arrays_budget = 8'000'000;
+constexpr int rows_with_worst_values = 300;
+constexpr Eigen::Index worst_values = 256;
+
+bool has_arrays(const CheckRow& row) {
+  return row.error.size() > 0 && row.error.size() == row.tolerances.size();
+}
+
+/// |error| / tolerance; 0 where both are 0, infinite where only the tolerance is. NaN counts as
+/// infinite, so that it sorts as the worst.
+Eigen::VectorXd scores_of(const CheckRow& row) {
+  Eigen::VectorXd scores(row.error.size());
+  for (Eigen::Index k = 0; k < scores.size(); ++k) {
+    const double error = std::abs(row.error[k]);
+    const double score = error == 0 && row.tolerances[k] == 0 ? 0 : error / row.tolerances[k];
+    scores[k] = std::isnan(score) ? std::numeric_limits<double>::infinity() : score;
+  }
+  return scores;
+}
+
+/// Nearest-rank quantiles of the scores; what the row already has, or NaN, where it has no arrays.
+std::vector<double> quantiles_of(const CheckRow& row) {
+  if (!has_arrays(row))
+    return row.score_quantiles.size() == quantile_percent.size()
+               ? row.score_quantiles
+               : std::vector<double>(quantile_percent.size(), nan);
+  Eigen::VectorXd scores = scores_of(row);
+  std::sort(scores.begin(), scores.end());
+  std::vector<double> q;
+  for (const int percent : quantile_percent)
+    q.push_back(scores[std::lround(percent / 100.0 * static_cast<double>(scores.size() - 1))]);
+  return q;
+}
+
+using TextColumn = std::string CheckRow::*;
+using IntegerColumn = std::int64_t CheckRow::*;
+using RealColumn = double CheckRow::*;
+
+constexpr std::array<std::pair<const char*, TextColumn>, 9> text_columns = {{
+    {"backend", &CheckRow::backend},
+    {"options", &CheckRow::options},
+    {"executor", &CheckRow::executor},
+    {"device", &CheckRow::device},
+    {"fixture", &CheckRow::fixture},
+    {"check", &CheckRow::check},
+    {"field", &CheckRow::field},
+    {"unit", &CheckRow::unit},
+    {"reason", &CheckRow::reason},
+}};
+constexpr std::array<std::pair<const char*, IntegerColumn>, 3> integer_columns = {{
+    {"n", &CheckRow::n},
+    {"worst_id", &CheckRow::worst_id},
+    {"excluded", &CheckRow::excluded},
+}};
+constexpr std::array<std::pair<const char*, RealColumn>, 5> real_columns = {{
+    {"value", &CheckRow::value},
+    {"tolerance", &CheckRow::tolerance},
+    {"score", &CheckRow::score},
+    {"median_score", &CheckRow::median_score},
+    {"float_score", &CheckRow::float_score},
+}};
+
+Eigen::VectorXd real_column(const std::vector<CheckRow>& rows, RealColumn member) {
+  Eigen::VectorXd values(static_cast<Eigen::Index>(rows.size()));
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    values[static_cast<Eigen::Index>(k)] = rows[k].*member;
+  return values;
+}
+
+void write_summary(Hdf5Writer& out, const std::vector<CheckRow>& rows) {
+  for (const auto& [name, member] : text_columns) {
+    std::vector<std::string> values;
+    for (const auto& row : rows)
+      values.push_back(member == &CheckRow::reason ? judged_reason(row) : row.*member);
+    out.strings(std::string("/summary/") + name, values);
+  }
+  std::vector<std::string> verdicts;
+  for (const auto& row : rows) verdicts.push_back(to_string(judged_verdict(row)));
+  out.strings("/summary/verdict", verdicts, "pass, fail or not_run");
+  for (const auto& [name, member] : integer_columns) {
+    IdVector values(static_cast<Eigen::Index>(rows.size()));
+    for (std::size_t k = 0; k < rows.size(); ++k)
+      values[static_cast<Eigen::Index>(k)] = rows[k].*member;
+    out.integers(std::string("/summary/") + name, values);
+  }
+  for (const auto& [name, member] : real_columns)
+    out.vector(std::string("/summary/") + name, real_column(rows, member), {});
+
+  std::vector<Eigen::VectorXd> quantiles(quantile_percent.size(),
+                                         Eigen::VectorXd(static_cast<Eigen::Index>(rows.size())));
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const auto q = quantiles_of(rows[k]);
+    for (std::size_t p = 0; p < q.size(); ++p) quantiles[p][static_cast<Eigen::Index>(k)] = q[p];
+  }
+  for (std::size_t p = 0; p < quantiles.size(); ++p)
+    out.vector(fmt::format("/summary/score_p{}", quantile_percent[p]), quantiles[p], "1",
+               fmt::format("{} % of the values score at most this", quantile_percent[p]));
+}
+
+/// Arrays of one failing row, whole or the worst values; the rest is in the summary.
+void write_check(Hdf5Writer& out, const std::string& group, const CheckRow& row, bool whole) {
+  Eigen::VectorXd error = row.error, tolerance = row.tolerances;
+  if (!whole) {
+    const Eigen::VectorXd scores = scores_of(row);
+    IdVector order = IdVector::LinSpaced(scores.size(), 0, scores.size() - 1);
+    const Eigen::Index kept = std::min(worst_values, scores.size());
+    std::partial_sort(order.begin(), order.begin() + kept, order.end(),
+                      [&](std::int64_t a, std::int64_t b) {
+                        return scores[a] != scores[b] ? scores[a] > scores[b] : a < b;
+                      });
+    const IdVector worst = order.head(kept);
+    error = row.error(worst).eval();
+    tolerance = row.tolerances(worst).eval();
+    out.integers(group + "/index", worst, "place in the whole array, worst first");
+  }
+  out.vector(group + "/error", error, row.unit, "|error|", Storage::fp32);
+  out.vector(group + "/tolerance", tolerance, row.unit, "allowed |error|", Storage::fp32);
+  out.attribute(group, "backend", row.backend);
+  out.attribute(group, "fixture", row.fixture);
+  out.attribute(group, "check", row.check);
+  out.attribute(group, "field", row.field);
+  out.attribute(group, "kept", whole ? "whole" : "worst");
+}
+
+void write_checks(Hdf5Writer& out, const std::vector<CheckRow>& rows) {
+  out.group("/checks");
+  std::int64_t budget = whole_arrays_budget;
+  int worst_left = rows_with_worst_values;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const CheckRow& row = rows[k];
+    if (judged_verdict(row) != Verdict::fail || !has_arrays(row)) continue;
+    const std::int64_t bytes = 2 * 4 * row.error.size() + 4096;
+    const bool whole = bytes <= budget;
+    if (whole) budget -= bytes;
+    if (!whole && worst_left-- <= 0) continue;
+    write_check(out, fmt::format("/checks/{:06}", k), row, whole);
+  }
+}
+
+}  // namespace
+
+const char* to_string(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::pass:
+      return "pass";
+    case Verdict::fail:
+      return "fail";
+    case Verdict::not_run:
+      return "not_run";
+  }
+  return "fail";
+}
+
+Verdict judged_verdict(const CheckRow& row) {
+  const bool stands =
+      row.score >= 0 && row.score <= 1 && !std::isnan(row.value) && !std::isnan(row.tolerance);
+  return row.verdict == Verdict::pass && !stands ? Verdict::fail : row.verdict;
+}
+
+std::string judged_reason(const CheckRow& row) {
+  if (judged_verdict(row) == row.verdict) return row.reason;
+  return fmt::format("said to pass with score {}, value {}, tolerance {}", row.score, row.value,
+                     row.tolerance);
+}
+
+void condense(CheckRow& row) {
+  row.score_quantiles = quantiles_of(row);
+  if (judged_verdict(row) != Verdict::pass) return;
+  row.error.resize(0);
+  row.tolerances.resize(0);
+}
+
+int exit_status(const Report& report) {
+  bool fails = false, missing = report.rows.empty();
+  for (const auto& row : report.rows) {
+    const Verdict verdict = judged_verdict(row);
+    fails |= verdict == Verdict::fail;
+    missing |= verdict == Verdict::not_run;
+  }
+  return fails ? 1 : missing ? 3 : 0;
+}
+
+void write_report(const std::filesystem::path& file, const Report& report) {
+  const auto& rows = report.rows;
+  const int status = exit_status(report);
+  Hdf5Writer out(file, 9);
+  out.attribute("/", "decant_report", report_schema);
+  out.attribute("/", "verdict", status == 0 ? "pass" : status == 1 ? "fail" : "not_run");
+  write_summary(out, rows);
+  write_checks(out, rows);
+  out.group("/provenance");
+  for (const auto& [name, text] : report.provenance) out.attribute("/provenance", name, text);
+  out.commit();
+}
+
+Report read_report(const std::filesystem::path& file) {
+  const Hdf5Reader in(file);
+  const std::int64_t schema = in.integer_attribute("/", "decant_report");
+  if (schema != report_schema)
+    in.fail("/@decant_report", std::to_string(schema), std::to_string(report_schema));
+  Report report;
+  const std::vector<std::string> verdicts = in.strings("/summary/verdict");
+  const auto n = static_cast<std::int64_t>(verdicts.size());
+  report.rows.resize(verdicts.size());
+  for (const auto& [name, member] : text_columns) {
+    auto values = in.strings(std::string("/summary/") + name, n);
+    for (std::size_t k = 0; k < values.size(); ++k) report.rows[k].*member = std::move(values[k]);
+  }
+  for (const auto& [name, member] : integer_columns) {
+    const IdVector values = in.integers(std::string("/summary/") + name, n);
+    for (Eigen::Index k = 0; k < n; ++k)
+      report.rows[static_cast<std::size_t>(k)].*member = values[k];
+  }
+  for (const auto& [name, member] : real_columns) {
+    const Eigen::VectorXd values = in.vector(std::string("/summary/") + name, n);
+    for (Eigen::Index k = 0; k < n; ++k)
+      report.rows[static_cast<std::size_t>(k)].*member = values[k];
+  }
+  for (const int percent : quantile_percent) {
+    const Eigen::VectorXd values = in.vector(fmt::format("/summary/score_p{}", percent), n);
+    for (Eigen::Index k = 0; k < n; ++k)
+      report.rows[static_cast<std::size_t>(k)].score_quantiles.push_back(values[k]);
+  }
+  for (std::size_t k = 0; k < verdicts.size(); ++k) {
+    const std::string& text = verdicts[k];
+    if (text != "pass" && text != "fail" && text != "not_run")
+      in.fail("/summary/verdict", fmt::format("{} at {}", text, k), "pass, fail or not_run");
+    report.rows[k].verdict = text == "pass"   ? Verdict::pass
+                             : text == "fail" ? Verdict::fail
+                                              : Verdict::not_run;
+  }
+  for (const auto& name : in.attribute_names("/provenance"))
+    report.provenance[name] = in.text_attribute("/provenance", name);
+  return report;
+}
+
+}  // namespace decant

@@ -1,0 +1,89 @@
+/// \file
+/// What a conformance run leaves behind: flat columns under /summary, the arrays behind each
+/// failing check, where it all came from; and the console table. The file's layout is in
+/// report-format.md.
+#pragma once
+
+#include "oracle/backend.hpp"
+
+#include <Eigen/Dense>
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace decant {
+
+enum class Verdict : std::uint8_t { pass, fail, not_run };
+/// "pass", "fail" or "not_run".
+const char* to_string(Verdict verdict);
+
+/// One line of /summary: one field of one check of one backend on one fixture.
+struct CheckRow {
+  std::string backend, options, executor, device;
+  std::string fixture;
+  std::string check;  // "neighbors", "boundary_volume", "density", …
+  std::string field;
+  std::string unit;
+  std::int64_t n = 0;    // values compared
+  double value = 0;      // largest |error|, in `unit`
+  double tolerance = 0;  // that value's own tolerance
+  double score = 0;      // max |error| / tolerance; passes where score <= 1
+  double median_score = 0;
+  double float_score = 0;  // score of the oracle's source in sequential fp32; NaN where none
+  std::int64_t worst_id = -1;
+  std::int64_t excluded = 0;  // ambiguous particles left out, by name and within a bound
+  Verdict verdict = Verdict::not_run;
+  std::string reason;  // why not_run or fail; empty on a pass
+  /// Per-particle |error| and tolerance (N, or 3N by component); kept whole for a failing check, as
+  /// quantiles of the score for a passing one.
+  Eigen::VectorXd error, tolerances;
+  /// Score that `quantile_percent` % of the values do not exceed; empty until `condense`.
+  std::vector<double> score_quantiles;
+};
+
+inline constexpr std::array<int, 9> quantile_percent = {0, 1, 5, 25, 50, 75, 95, 99, 100};
+
+/// Fills the row's score quantiles from its arrays, and drops the arrays where the row passes, so
+/// that a long run does not hold what no report will keep.
+void condense(CheckRow& row);
+
+struct Report {
+  std::vector<CheckRow> rows;
+  std::map<std::string, std::string> provenance;
+};
+
+/// Schema version of report files; a reader refuses any other.
+inline constexpr std::int64_t report_schema = 1;
+
+/// The verdict as every consumer must read it: a pass stands only where 0 <= score <= 1 and value
+/// and tolerance are numbers, otherwise it is a fail.
+Verdict judged_verdict(const CheckRow& row);
+
+/// The row's reason, or why its verdict of pass does not stand.
+std::string judged_reason(const CheckRow& row);
+
+/// Writes the report whole or not at all, below 15 MB: once failing checks have filled 8 MB, later
+/// ones keep their worst values, and then their quantiles alone. Throws std::runtime_error naming
+/// the file where writing fails.
+void write_report(const std::filesystem::path& file, const Report& report);
+
+/// Rows and provenance of a report, without the arrays. Throws InputError naming file and dataset.
+Report read_report(const std::filesystem::path& file);
+
+/// Table of backend × fixture: verdict, worst score, the check it came from; then every row that
+/// did not pass with field, particle, error and tolerance; last one line for the whole. Plain text,
+/// at most 100 columns.
+std::string console_table(const Report& report);
+
+/// The last line of the table: "6 fixtures × 1 backend: pass".
+std::string verdict_line(const Report& report);
+
+/// 0 all pass; 1 something fails; 3 something asked for could not run (and nothing fails), or the
+/// report is empty.
+int exit_status(const Report& report);
+
+}  // namespace decant

@@ -1,0 +1,126 @@
+/// \file
+/// Signed distance in the half-plane of a revolved outline, and to the faces of a box union.
+#include "reference/distance.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace decant {
+namespace {
+
+/// Nearest point of a segment, 2D.
+struct Nearest {
+  double r, z, squared;
+};
+
+Nearest nearest_on(const ProfileEdge& e, double r, double z) {
+  const double dr = e.r1 - e.r0, dz = e.z1 - e.z0;
+  const double s = std::clamp(((r - e.r0) * dr + (z - e.z0) * dz) / (dr * dr + dz * dz), 0.0, 1.0);
+  const double nr = e.r0 + s * dr, nz = e.z0 + s * dz;
+  return {nr, nz, (r - nr) * (r - nr) + (z - nz) * (z - nz)};
+}
+
+/// Number of surface edges that a ray in +r from (r, z) meets.
+int crossings_outward(const std::vector<ProfileEdge>& edges, double r, double z) {
+  int count = 0;
+  for (const auto& e : edges) {
+    if ((e.z0 > z) == (e.z1 > z)) continue;
+    if (r < e.r0 + (z - e.z0) / (e.z1 - e.z0) * (e.r1 - e.r0)) ++count;
+  }
+  return count;
+}
+
+int crossings_below(const std::vector<ProfileEdge>& edges, double r, double z) {
+  int count = 0;
+  for (const auto& e : edges) {
+    if ((e.r0 > r) == (e.r1 > r)) continue;
+    if (z > e.z0 + (r - e.r0) / (e.r1 - e.r0) * (e.z1 - e.z0)) ++count;
+  }
+  return count;
+}
+
+SurfaceDistance revolved_distance(const std::vector<ProfileEdge>& edges, const Vec3& x) {
+  const double r = std::hypot(x.x(), x.y()), z = x.z();
+  Nearest best{0, 0, std::numeric_limits<double>::infinity()};
+  const ProfileEdge* nearest_edge = &edges.front();
+  for (const auto& e : edges) {
+    const Nearest n = nearest_on(e, r, z);
+    if (n.squared < best.squared) {
+      best = n;
+      nearest_edge = &e;
+    }
+  }
+  const bool inside = crossings_outward(edges, r, z) % 2 == 1;
+  const double d = std::sqrt(best.squared);
+  const double sign = inside ? -1.0 : 1.0;
+  double normal_r, normal_z;
+  if (d > 1e-12) {
+    normal_r = sign * (r - best.r) / d;
+    normal_z = sign * (z - best.z) / d;
+  } else {
+    const double dr = nearest_edge->r1 - nearest_edge->r0, dz = nearest_edge->z1 - nearest_edge->z0;
+    const double length = std::hypot(dr, dz);
+    normal_r = dz / length;
+    normal_z = -dr / length;
+  }
+  const Vec3 meridian = r > 0 ? Vec3(x.x() / r, x.y() / r, 0.0) : Vec3::UnitX();
+  return {sign * d, normal_r * meridian + Vec3(0, 0, normal_z)};
+}
+
+SurfaceDistance box_distance(const std::vector<BoxFace>& faces, const std::vector<SolidBox>& solid,
+                             const Vec3& x) {
+  double best = std::numeric_limits<double>::infinity();
+  Vec3 offset = Vec3::Zero();
+  BoxFace at{};
+  for (const auto& face : faces) {
+    const Vec3 to_x = x - x.cwiseMax(face.min).cwiseMin(face.max);
+    if (to_x.squaredNorm() < best) {
+      best = to_x.squaredNorm();
+      offset = to_x;
+      at = face;
+    }
+  }
+  const double d = std::sqrt(best);
+  const double sign = in_solid(solid, x) ? -1.0 : 1.0;
+  if (d > 1e-12) return {sign * d, sign * offset / d};
+  return {0.0, at.side * Vec3::Unit(at.axis)};
+}
+
+}  // namespace
+
+SolidDistance::SolidDistance(const Container& container)
+    : revolved_(std::holds_alternative<RevolvedShape>(container.shape)) {
+  low_.setConstant(std::numeric_limits<double>::infinity());
+  high_ = -low_;
+  if (revolved_) {
+    edges_ = surface_edges(std::get<RevolvedShape>(container.shape));
+    for (const auto& e : edges_) {
+      const double r = std::max(e.r0, e.r1);
+      low_ = low_.cwiseMin(Vec3(-r, -r, std::min(e.z0, e.z1)));
+      high_ = high_.cwiseMax(Vec3(r, r, std::max(e.z0, e.z1)));
+    }
+  } else {
+    box_ = std::get<BoxShape>(container.shape);
+    faces_ = exposed_faces(box_);
+    for (const auto& b : box_.solid) {
+      low_ = low_.cwiseMin(b.min);
+      high_ = high_.cwiseMax(b.max);
+    }
+  }
+}
+
+SurfaceDistance SolidDistance::at(const Vec3& local) const {
+  return revolved_ ? revolved_distance(edges_, local) : box_distance(faces_, box_.solid, local);
+}
+
+bool SolidDistance::in_cavity(const Vec3& local) const {
+  if (!revolved_)
+    return (local.array() >= box_.cavity.min.array()).all() &&
+           (local.array() <= box_.cavity.max.array()).all() && !in_solid(box_.solid, local);
+  const double r = std::hypot(local.x(), local.y());
+  const int outward = crossings_outward(edges_, r, local.z());
+  return outward > 0 && outward % 2 == 0 && crossings_below(edges_, r, local.z()) > 0;
+}
+
+}  // namespace decant

@@ -1,0 +1,145 @@
+/// \file
+/// What a scene is: everything that changes the answer, and nothing else. Plain data, SI units.
+/// A backend's own options (skin, rebuild interval, lanes, capacities) are not scene.
+///
+/// Legend used throughout the project: dx particle spacing, H support radius, h = H/2 smoothing
+/// length, m particle mass, rho0 rest density, c0 sound speed, gamma exponent of the equation of
+/// state, B its stiffness, mu dynamic viscosity, mu_w that of the wall terms, dt substep, t time.
+#pragma once
+
+#include <Eigen/Dense>
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace decant {
+
+using Vec3 = Eigen::Vector3d;
+
+enum class KernelFamily { cubic_spline, wendland_c2, mueller2003 };
+
+/// Material of the fluid, and the walls' share of its viscosity.
+struct FluidProperties {
+  double rest_density = 1000.0;  // kg/m³
+  double sound_speed = 10.0;     // m/s
+  double eos_exponent = 7.0;     // 7 or 1
+  bool allow_tension = false;    // false: p = max(p, 0)
+  double viscosity = 0.05;       // Pa·s
+  double wall_viscosity = 0.1;   // Pa·s; twice the viscosity unless the scene says otherwise
+};
+
+/// One point of a tilt schedule. Between two keys the angle follows the smoothstep 3s² − 2s³;
+/// before the first and after the last it rests.
+struct TiltKey {
+  double time;   // s
+  double angle;  // rad, right-handed about the axis
+};
+
+/// Rigid rotation of a container about a fixed line in the world.
+struct Tilt {
+  Vec3 pivot;                 // m, world, a point of the line
+  Vec3 axis;                  // unit vector
+  std::vector<TiltKey> keys;  // times strictly increasing
+};
+
+/// Solid of revolution about the frame's z axis. `profile` is the closed outline of the solid's
+/// cross-section in (r, z), m, r >= 0, listed so that the solid lies to the left. Edges on the
+/// axis are not surface.
+struct RevolvedShape {
+  std::vector<std::array<double, 2>> profile;
+};
+
+struct SolidBox {
+  Vec3 min, max;  // m, container frame
+};
+
+/// Union of axis-aligned boxes around a cavity (a tank, a channel). Where a periodic axis cuts the
+/// solid, the cut is not surface.
+struct BoxShape {
+  SolidBox cavity;              // the room for fluid; decides "in which container"
+  std::vector<SolidBox> solid;  // may touch and overlap
+  std::array<bool, 3> endless = {false, false, false};  // the domain's periodic axes
+};
+
+struct Container {
+  std::string name;
+  std::variant<RevolvedShape, BoxShape> shape;
+  Vec3 origin = Vec3::Zero();  // m, world position of the container's frame while untilted
+  double wall_thickness = 0;   // m, the thinnest wall of the solid
+  std::optional<Tilt> tilt;
+};
+
+/// Fluid at the start: a lattice of spacing dx that begins dx/2 from the surfaces, either in a
+/// container up to a level, or in a free box.
+struct Fill {
+  std::string container;        // empty: the box is in the world and stands alone
+  double level = 0;             // m above the cavity's bottom (container) — unused for a box
+  std::optional<SolidBox> box;  // m, world, or container frame where a container is named
+  Vec3 velocity = Vec3::Zero();  // m/s
+};
+
+/// Analytic plane z = height without wall particles.
+struct Floor {
+  double height;  // m
+};
+
+/// Where particles may be. Leaving it is an error on a free axis and a wrap on a periodic one.
+struct Domain {
+  Vec3 min, max;                                       // m
+  std::array<bool, 3> periodic = {false, false, false};
+};
+
+struct Contact {
+  double distance_ratio = 0.25;  // contact distance / dx
+  double restitution = 0.0;      // 0 … 1
+  double friction = 0.0;         // >= 0
+};
+
+struct Schedule {
+  double end = 0;                         // s
+  int frames = 1;                         // written after the initial one
+  int substeps_per_frame = 0;             // 0: not derived yet
+  bool substeps_derived = true;           // false: the scene sets them, and no rule changes them
+  double courant = 0.4;                   // dt <= courant · h / (c0 + v_max)
+  std::optional<double> max_speed;        // m/s; replaces the estimate from the fall height
+};
+
+struct Scene {
+  std::string name;
+  double particle_spacing = 0;  // dx, m
+  double support_ratio = 2.0;   // H / dx
+  KernelFamily kernel = KernelFamily::cubic_spline;
+  double mass_ratio = 1.0;      // m / (rho0 dx³); a family that starts compressed is calibrated here
+  FluidProperties fluid;
+  Vec3 gravity = Vec3(0, 0, -9.81);  // m/s², or any constant body force
+  Domain domain;
+  std::optional<Floor> floor;
+  Contact contact;
+  int wall_layers = 2;
+  std::vector<Container> containers;
+  std::vector<Fill> fills;
+  Schedule schedule;
+
+  double support_radius() const { return support_ratio * particle_spacing; }
+  double smoothing_length() const { return 0.5 * support_radius(); }
+  double particle_mass() const {
+    return mass_ratio * fluid.rest_density * particle_spacing * particle_spacing * particle_spacing;
+  }
+  /// B = rho0 c0² / gamma, Pa.
+  double eos_stiffness() const {
+    return fluid.rest_density * fluid.sound_speed * fluid.sound_speed / fluid.eos_exponent;
+  }
+  double time_step() const {
+    return schedule.end / (static_cast<double>(schedule.frames) * schedule.substeps_per_frame);
+  }
+  /// t = n·dt, never accumulated.
+  double time_at(std::int64_t substep) const { return static_cast<double>(substep) * time_step(); }
+  double contact_distance() const { return contact.distance_ratio * particle_spacing; }
+};
+
+}  // namespace decant

@@ -1,0 +1,353 @@
+/// \file
+/// What a scene file may say, and the Scene that it means. Ranges that need more than one value at
+/// a time (overlap, time step, fill against cup) are scene_checks.cpp.
+#include "reference/scene_file.hpp"
+
+#include "reference/error.hpp"
+#include "reference/scene_checks.hpp"
+#include "reference/scene_json_reader.hpp"
+#include "reference/shapes.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <numbers>
+
+namespace decant {
+namespace {
+
+const Range positive{.low = 0.0, .high = 1e6, .low_open = true};
+const Range non_negative{.low = 0.0, .high = 1e6};
+const Range coordinate{.low = -1e4, .high = 1e4};  // m
+const Range unit_interval{.low = 0.0, .high = 1.0};
+
+const ObjectKeys& keys_of(const std::string& name) {
+  const auto& all = scene_file_keys();
+  return *std::find_if(all.begin(), all.end(), [&](const ObjectKeys& k) { return k.name == name; });
+}
+
+template <typename T>
+T optional_or(const JsonValue& object, const std::string& key, T otherwise,
+              T (*read)(const JsonValue&)) {
+  return object.has(key) ? read(object[key]) : otherwise;
+}
+
+double read_non_negative(const JsonValue& v) { return v.number(non_negative); }
+double read_unit_interval(const JsonValue& v) { return v.number(unit_interval); }
+
+FluidProperties read_fluid(const JsonValue& v) {
+  v.check_keys(keys_of("fluid"));
+  FluidProperties fluid;
+  fluid.rest_density = v["rest_density"].number(positive);
+  fluid.sound_speed = v["sound_speed"].number(positive);
+  fluid.viscosity = v["viscosity"].number(non_negative);
+  if (v.has("eos_exponent")) {
+    const JsonValue exponent = v["eos_exponent"];
+    fluid.eos_exponent = exponent.number({});
+    if (fluid.eos_exponent != 7.0 && fluid.eos_exponent != 1.0) exponent.refuse("7 or 1");
+  }
+  if (v.has("allow_tension")) fluid.allow_tension = v["allow_tension"].boolean();
+  fluid.wall_viscosity = optional_or(v, "wall_viscosity", 2.0 * fluid.viscosity, read_non_negative);
+  return fluid;
+}
+
+/// \param keys  the name of the object that has `min` and `max`, for its other keys
+SolidBox read_box(const JsonValue& v, const std::string& keys) {
+  v.check_keys(keys_of(keys));
+  const SolidBox box{v["min"].vector(coordinate), v["max"].vector(coordinate)};
+  for (int a = 0; a < 3; ++a)
+    if (!(box.min[a] < box.max[a]))
+      v["max"].elements(3, 3)[static_cast<std::size_t>(a)].refuse("greater than min, which is " +
+                                                                  to_text(box.min[a]));
+  return box;
+}
+
+Domain read_domain(const JsonValue& v) {
+  const SolidBox box = read_box(v, "domain");
+  Domain domain{box.min, box.max, {false, false, false}};
+  if (!v.has("periodic")) return domain;
+  for (const auto& axis : v["periodic"].elements(0, 3)) {
+    const auto a = axis.choice({"x", "y", "z"});
+    if (domain.periodic[a]) axis.refuse("each axis once");
+    domain.periodic[a] = true;
+  }
+  return domain;
+}
+
+Contact read_contact(const JsonValue& v) {
+  v.check_keys(keys_of("contact"));
+  Contact contact;
+  // The lattice starts dx/2 from the walls: a longer contact distance would move it at once.
+  if (v.has("distance_ratio"))
+    contact.distance_ratio = v["distance_ratio"].number({.low = 0.0, .high = 0.5});
+  contact.restitution = optional_or(v, "restitution", contact.restitution, read_unit_interval);
+  contact.friction = optional_or(v, "friction", contact.friction, read_non_negative);
+  return contact;
+}
+
+Tilt read_tilt(const JsonValue& v) {
+  v.check_keys(keys_of("tilt"));
+  Tilt tilt;
+  tilt.pivot = v["pivot"].vector(coordinate);
+  tilt.axis = v["axis"].vector(coordinate);
+  const double length = tilt.axis.norm();
+  if (!(length > 1e-6)) v["axis"].refuse("a direction longer than 1e-6; it need not be a unit");
+  // An axis that is a unit to rounding stays in its bits, so that a written scene reads back equal.
+  if (std::abs(length - 1.0) > 1e-14) tilt.axis /= length;
+  for (const auto& key : v["keys"].elements(1, 10000)) {
+    key.check_keys(keys_of("tilt_key"));
+    if (key.has("angle") == key.has("angle_deg"))
+      key.refuse("exactly one of angle (rad) and angle_deg");
+    const double time = key["time"].number(non_negative);
+    if (!tilt.keys.empty() && !(time > tilt.keys.back().time))
+      key["time"].refuse("later than the key before it, at " + to_text(tilt.keys.back().time));
+    constexpr double degree = std::numbers::pi / 180.0;
+    const double angle = key.has("angle")
+                             ? key["angle"].number({.low = -7.0, .high = 7.0})
+                             : key["angle_deg"].number({.low = -360.0, .high = 360.0}) * degree;
+    tilt.keys.push_back({time, angle});
+  }
+  return tilt;
+}
+
+double cross(const std::array<double, 2>& o, const std::array<double, 2>& a,
+             const std::array<double, 2>& b) {
+  return (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0]);
+}
+
+RevolvedShape read_profile(const JsonValue& v) {
+  RevolvedShape shape;
+  const auto points = v.elements(3, 1000);
+  for (const auto& point : points) {
+    const auto rz = point.elements(2, 2);
+    shape.profile.push_back(
+        {rz[0].number({.low = 0.0, .high = coordinate.high}), rz[1].number(coordinate)});
+  }
+  const auto& p = shape.profile;
+  const std::size_t n = p.size();
+  double area = 0;
+  for (std::size_t k = 0; k < n; ++k) {
+    const auto& next = p[(k + 1) % n];
+    if (p[k] == next) points[k].refuse("different from the point after it");
+    area += 0.5 * (p[k][0] * next[1] - next[0] * p[k][1]);
+  }
+  for (std::size_t k = 0; k < n; ++k)
+    for (std::size_t l = k + 2; l < n; ++l) {
+      if (k == 0 && l == n - 1) continue;
+      const auto &a = p[k], &b = p[k + 1], &c = p[l], &d = p[(l + 1) % n];
+      if (cross(a, b, c) * cross(a, b, d) < 0 && cross(c, d, a) * cross(c, d, b) < 0)
+        points[l].refuse(
+            "an outline that does not cross itself; the edge from here meets that from"
+            " point " +
+            std::to_string(k));
+    }
+  if (!(area > 0)) v.refuse("an outline with the solid on its left (counter-clockwise in r, z)");
+  return shape;
+}
+
+BoxShape read_tank(const JsonValue& v, const Domain& domain, double& wall_thickness) {
+  v.check_keys(keys_of("tank"));
+  wall_thickness = v["wall_thickness"].number(positive);
+  const Vec3 size = v["size"].vector(positive);
+  OpenFaces open{};
+  if (v.has("open"))
+    for (const auto& face : v["open"].elements(0, 5)) {
+      const auto which = face.choice({"-x", "+x", "-y", "+y", "-z", "+z"});
+      bool& is_open = open[which / 2][which % 2];
+      if (is_open) face.refuse("each face once");
+      is_open = true;
+    }
+  for (std::size_t a = 0; a < 3; ++a) {
+    const bool both_open = open[a][0] && open[a][1];
+    if (domain.periodic[a] && !both_open) {
+      const char axis = "xyz"[a];
+      const std::string bound = std::string("both -") + axis + " and +" + axis +
+                                ", because the domain is periodic along " + axis;
+      if (v.has("open")) v["open"].refuse(bound);
+      throw InputError(v.file(), v.path() + ".open", "missing", bound);
+    }
+    // The walls end where a face is open, so the tank's extent is theirs.
+    const auto axis = static_cast<Eigen::Index>(a);
+    if (both_open && !domain.periodic[a] && size[axis] < wall_thickness)
+      v["size"].elements(3, 3)[a].refuse("no less than wall_thickness, which is " +
+                                         to_text(wall_thickness) + ", where both faces are open");
+  }
+  return tank_shape(size, wall_thickness, open);
+}
+
+BoxShape read_boxes(const JsonValue& v, const Domain& domain, double& wall_thickness) {
+  v.check_keys(keys_of("boxes"));
+  wall_thickness = v["wall_thickness"].number(positive);
+  BoxShape shape;
+  shape.cavity = read_box(v["cavity"], "box");
+  for (const auto& box : v["solid"].elements(1, 1000)) {
+    shape.solid.push_back(read_box(box, "box"));
+    const Vec3 extent = shape.solid.back().max - shape.solid.back().min;
+    for (std::size_t a = 0; a < 3; ++a)
+      // Ends on a periodic axis are no surface, so that extent is no thickness.
+      if (!domain.periodic[a] && extent[static_cast<Eigen::Index>(a)] < wall_thickness * (1 - 1e-9))
+        box.refuse("no thinner than wall_thickness, which is " + to_text(wall_thickness));
+  }
+  return shape;
+}
+
+Container read_container(const JsonValue& v, const Domain& domain) {
+  v.check_keys(keys_of("container"));
+  Container container;
+  container.name = v["name"].name();
+  container.origin = optional_or<Vec3>(v, "origin", Vec3::Zero(),
+                                       [](const JsonValue& o) { return o.vector(coordinate); });
+  if (v.has("cup") + v.has("tank") + v.has("revolved") + v.has("boxes") != 1)
+    v.refuse("exactly one of cup, tank, revolved, boxes");
+  if (v.has("cup")) {
+    const JsonValue cup = v["cup"];
+    cup.check_keys(keys_of("cup"));
+    container.wall_thickness = cup["wall_thickness"].number(positive);
+    container.shape = cup_shape(cup["inner_radius"].number(positive),
+                                cup["inner_height"].number(positive), container.wall_thickness);
+  } else if (v.has("revolved")) {
+    const JsonValue revolved = v["revolved"];
+    revolved.check_keys(keys_of("revolved"));
+    container.wall_thickness = revolved["wall_thickness"].number(positive);
+    container.shape = read_profile(revolved["profile"]);
+  } else {
+    BoxShape shape = v.has("tank") ? read_tank(v["tank"], domain, container.wall_thickness)
+                                   : read_boxes(v["boxes"], domain, container.wall_thickness);
+    shape.endless = domain.periodic;
+    container.shape = std::move(shape);
+  }
+  if (v.has("tilt")) container.tilt = read_tilt(v["tilt"]);
+  return container;
+}
+
+Fill read_fill(const JsonValue& v, const std::vector<Container>& containers) {
+  v.check_keys(keys_of("fill"));
+  Fill fill;
+  if (v.has("container")) {
+    fill.container = v["container"].text();
+    std::string names;
+    bool found = false;
+    for (const auto& c : containers) {
+      names += (names.empty() ? "" : ", ") + c.name;
+      found = found || c.name == fill.container;
+    }
+    if (!found) v["container"].refuse("the name of a container: " + names);
+  }
+  if (v.has("level") == v.has("box")) v.refuse("exactly one of level and box");
+  if (v.has("level")) {
+    if (fill.container.empty()) v["level"].refuse("a box, because no container is named");
+    fill.level = v["level"].number(positive);
+  } else {
+    fill.box = read_box(v["box"], "box");
+  }
+  if (v.has("velocity")) fill.velocity = v["velocity"].vector({.low = -1e4, .high = 1e4});
+  return fill;
+}
+
+Schedule read_time(const JsonValue& v) {
+  v.check_keys(keys_of("time"));
+  Schedule schedule;
+  schedule.end = v["end"].number(positive);
+  schedule.frames = v["frames"].integer(1, 1000000);
+  if (v.has("courant"))
+    schedule.courant = v["courant"].number({.low = 0.0, .high = 0.4, .low_open = true});
+  if (v.has("substeps_per_frame"))
+    schedule.substeps_per_frame = v["substeps_per_frame"].integer(1, 1000000000);
+  schedule.substeps_derived = !v.has("substeps_per_frame");
+  if (v.has("substeps_derived")) {
+    schedule.substeps_derived = v["substeps_derived"].boolean();
+    if (!schedule.substeps_derived && schedule.substeps_per_frame == 0)
+      v["substeps_derived"].refuse("true, because substeps_per_frame is missing");
+  }
+  if (v.has("max_speed")) schedule.max_speed = v["max_speed"].number(positive);
+  return schedule;
+}
+
+}  // namespace
+
+const std::vector<ObjectKeys>& scene_file_keys() {
+  static const std::vector<ObjectKeys> keys = {
+      {"scene",
+       {"decant_scene", "name", "particle_spacing", "fluid", "domain", "fill", "time"},
+       {"$schema", "kernel", "support_ratio", "mass_ratio", "gravity", "floor", "contact",
+        "wall_layers", "containers"}},
+      {"fluid",
+       {"rest_density", "sound_speed", "viscosity"},
+       {"eos_exponent", "allow_tension", "wall_viscosity"}},
+      {"domain", {"min", "max"}, {"periodic"}},
+      {"floor", {"height"}, {}},
+      {"contact", {}, {"distance_ratio", "restitution", "friction"}},
+      {"container", {"name"}, {"cup", "tank", "revolved", "boxes", "origin", "tilt"}},
+      {"cup", {"inner_radius", "inner_height", "wall_thickness"}, {}},
+      {"tank", {"size", "wall_thickness"}, {"open"}},
+      {"revolved", {"profile", "wall_thickness"}, {}},
+      {"boxes", {"cavity", "solid", "wall_thickness"}, {}},
+      {"box", {"min", "max"}, {}},
+      {"tilt", {"pivot", "axis", "keys"}, {}},
+      {"tilt_key", {"time"}, {"angle", "angle_deg"}},
+      {"fill", {}, {"container", "level", "box", "velocity"}},
+      {"time",
+       {"end", "frames"},
+       {"courant", "substeps_per_frame", "substeps_derived", "max_speed"}},
+  };
+  return keys;
+}
+
+Scene parse_scene(std::string_view text, const std::string& file) {
+  const nlohmann::json json = parse_json(text, file);
+  const JsonValue v(json, file, "");
+  v.check_keys(keys_of("scene"));
+  v["decant_scene"].integer(1, 1);
+  if (v.has("$schema")) v["$schema"].text();
+  Scene scene;
+  scene.name = v["name"].name();
+  scene.particle_spacing = v["particle_spacing"].number({.low = 1e-6, .high = 1e3});
+  if (v.has("kernel"))
+    scene.kernel = static_cast<KernelFamily>(
+        v["kernel"].choice({"cubic_spline", "wendland_c2", "mueller2003"}));
+  if (v.has("support_ratio"))
+    scene.support_ratio = v["support_ratio"].number({.low = 1.5, .high = 5.0});
+  if (v.has("mass_ratio")) scene.mass_ratio = v["mass_ratio"].number({.low = 0.5, .high = 2.0});
+  scene.fluid = read_fluid(v["fluid"]);
+  if (v.has("gravity")) scene.gravity = v["gravity"].vector({.low = -1e4, .high = 1e4});
+  scene.domain = read_domain(v["domain"]);
+  if (v.has("floor")) {
+    v["floor"].check_keys(keys_of("floor"));
+    scene.floor = Floor{v["floor"]["height"].number(coordinate)};
+  }
+  if (v.has("contact")) scene.contact = read_contact(v["contact"]);
+  if (v.has("wall_layers")) scene.wall_layers = v["wall_layers"].integer(1, 8);
+  if (v.has("containers"))
+    for (const auto& container : v["containers"].elements(0, 100)) {
+      scene.containers.push_back(read_container(container, scene.domain));
+      for (std::size_t k = 0; k + 1 < scene.containers.size(); ++k)
+        if (scene.containers[k].name == scene.containers.back().name)
+          container["name"].refuse("a name of its own; containers[" + std::to_string(k) +
+                                   "] has it already");
+    }
+  for (const auto& fill : v["fill"].elements(1, 1000))
+    scene.fills.push_back(read_fill(fill, scene.containers));
+  scene.schedule = read_time(v["time"]);
+  return scene;
+}
+
+Scene load_scene(const std::filesystem::path& file, std::vector<std::string>* warnings) {
+  const std::string name = file.string();
+  std::error_code ignored;
+  std::ifstream in(file, std::ios::binary);
+  if (std::filesystem::is_directory(file, ignored) || !in)
+    throw InputError(name, "(whole file)", "not readable", "a scene file");
+  const std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  Scene scene = parse_scene(text, name);
+  try {
+    if (scene.schedule.substeps_derived) scene.schedule.substeps_per_frame = substeps_for(scene);
+  } catch (const InputError& error) {
+    throw InputError(name, error.key(), error.value(), error.bound());
+  }
+  auto found = check_scene(scene, name);
+  if (warnings) *warnings = std::move(found);
+  return scene;
+}
+
+}  // namespace decant

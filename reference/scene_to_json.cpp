@@ -1,0 +1,109 @@
+/// \file
+/// The canonical text of a scene: general shapes, radians, every value written out, so that nothing
+/// depends on a default or on a conversion and the text reads back to the same bits.
+#include "reference/scene_file.hpp"
+
+#include <nlohmann/json.hpp>
+
+namespace decant {
+namespace {
+
+using json = nlohmann::ordered_json;  // keeps the order of the format's description
+
+json vector_json(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
+
+json box_json(const SolidBox& box) {
+  return {{"min", vector_json(box.min)}, {"max", vector_json(box.max)}};
+}
+
+const char* kernel_name(KernelFamily family) {
+  switch (family) {
+    case KernelFamily::cubic_spline:
+      return "cubic_spline";
+    case KernelFamily::wendland_c2:
+      return "wendland_c2";
+    case KernelFamily::mueller2003:
+      return "mueller2003";
+  }
+  return "";
+}
+
+json container_json(const Container& container) {
+  json out = {{"name", container.name}};
+  if (const auto* revolved = std::get_if<RevolvedShape>(&container.shape)) {
+    out["revolved"] = {{"profile", revolved->profile},
+                       {"wall_thickness", container.wall_thickness}};
+  } else {
+    const auto& boxes = std::get<BoxShape>(container.shape);
+    json solid = json::array();
+    for (const auto& box : boxes.solid) solid.push_back(box_json(box));
+    out["boxes"] = {{"cavity", box_json(boxes.cavity)},
+                    {"solid", solid},
+                    {"wall_thickness", container.wall_thickness}};
+  }
+  out["origin"] = vector_json(container.origin);
+  if (container.tilt) {
+    json keys = json::array();
+    for (const auto& key : container.tilt->keys)
+      keys.push_back({{"time", key.time}, {"angle", key.angle}});
+    out["tilt"] = {{"pivot", vector_json(container.tilt->pivot)},
+                   {"axis", vector_json(container.tilt->axis)},
+                   {"keys", keys}};
+  }
+  return out;
+}
+
+json fill_json(const Fill& fill) {
+  json out = json::object();
+  if (!fill.container.empty()) out["container"] = fill.container;
+  if (fill.box)
+    out["box"] = box_json(*fill.box);
+  else
+    out["level"] = fill.level;
+  out["velocity"] = vector_json(fill.velocity);
+  return out;
+}
+
+}  // namespace
+
+std::string scene_to_json(const Scene& scene) {
+  json out;
+  out["decant_scene"] = 1;
+  out["name"] = scene.name;
+  out["particle_spacing"] = scene.particle_spacing;
+  out["kernel"] = kernel_name(scene.kernel);
+  out["support_ratio"] = scene.support_ratio;
+  out["mass_ratio"] = scene.mass_ratio;
+  const auto& fluid = scene.fluid;
+  out["fluid"] = {{"rest_density", fluid.rest_density}, {"sound_speed", fluid.sound_speed},
+                  {"eos_exponent", fluid.eos_exponent}, {"allow_tension", fluid.allow_tension},
+                  {"viscosity", fluid.viscosity},       {"wall_viscosity", fluid.wall_viscosity}};
+  out["gravity"] = vector_json(scene.gravity);
+  json periodic = json::array();
+  for (std::size_t a = 0; a < 3; ++a)
+    if (scene.domain.periodic[a]) periodic.push_back(std::string(1, "xyz"[a]));
+  out["domain"] = {{"min", vector_json(scene.domain.min)},
+                   {"max", vector_json(scene.domain.max)},
+                   {"periodic", periodic}};
+  if (scene.floor) out["floor"] = {{"height", scene.floor->height}};
+  out["contact"] = {{"distance_ratio", scene.contact.distance_ratio},
+                    {"restitution", scene.contact.restitution},
+                    {"friction", scene.contact.friction}};
+  out["wall_layers"] = scene.wall_layers;
+  out["containers"] = json::array();
+  for (const auto& container : scene.containers)
+    out["containers"].push_back(container_json(container));
+  out["fill"] = json::array();
+  for (const auto& fill : scene.fills) out["fill"].push_back(fill_json(fill));
+  json& time = out["time"];
+  time = {{"end", scene.schedule.end},
+          {"frames", scene.schedule.frames},
+          {"courant", scene.schedule.courant}};
+  if (scene.schedule.substeps_per_frame != 0)
+    time["substeps_per_frame"] = scene.schedule.substeps_per_frame;
+  time["substeps_derived"] = scene.schedule.substeps_derived;
+  if (scene.schedule.max_speed) time["max_speed"] = *scene.schedule.max_speed;
+  return out.dump(2);
+}
+
+}  // namespace decant

@@ -1,0 +1,268 @@
+/// \file
+/// What a frame looks like on the disk: HDF5, CSV, XDMF, and the thread that puts it there.
+#include "tools/frame_writer.hpp"
+
+#include "oracle/hdf5_io.hpp"
+#include "reference/error.hpp"
+#include "tests/falling_points.hpp"
+#include "tools/xdmf.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <fstream>
+#include <regex>
+#include <sstream>
+
+namespace decant {
+namespace {
+
+using test::TemporaryFolder;
+
+constexpr std::int64_t particles = 7;
+
+/// Floats that need all their digits, tiny, huge, negative zero among them.
+Frame awkward_frame(const Scene& scene, const FrameLayout& layout, std::int64_t index) {
+  ParticleState state;
+  state.substep = index * scene.schedule.substeps_per_frame;
+  state.position.setRandom(3, particles);
+  state.velocity.setRandom(3, particles);
+  state.position(0, 0) = 0.1;
+  state.position(1, 0) = -0.0;
+  state.velocity(2, 1) = 1e-42;
+  state.velocity(0, 2) = 3.4e38;
+  Fields fields = Fields::unwritten(particles, 0);
+  fields.density.setConstant(1000.0 / 3.0);
+  fields.pressure.setLinSpaced(particles, -1.0, 1.0);
+  AuditResult audit;
+  audit.place.assign(particles, static_cast<std::uint8_t>(Place::receiver));
+  return make_frame(scene, layout, index, state, fields, audit);
+}
+
+std::string text_of(const std::filesystem::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file).rdbuf();
+  return text.str();
+}
+
+std::vector<std::vector<std::string>> csv_rows(const std::filesystem::path& file) {
+  std::vector<std::vector<std::string>> rows;
+  std::ifstream in(file);
+  for (std::string line; std::getline(in, line);) {
+    std::istringstream cells(line);
+    rows.emplace_back();
+    for (std::string cell; std::getline(cells, cell, ',');) rows.back().push_back(cell);
+  }
+  return rows;
+}
+
+/// float32 dataset as raw values.
+std::vector<float> floats_of(const std::filesystem::path& file, const std::string& dataset) {
+  const hid_t id = H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+  const hid_t data = H5Dopen2(id, dataset.c_str(), H5P_DEFAULT);
+  const hid_t space = H5Dget_space(data);
+  std::vector<float> values(static_cast<std::size_t>(H5Sget_simple_extent_npoints(space)));
+  EXPECT_GE(H5Dread(data, H5T_NATIVE_FLOAT, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), 0);
+  H5Sclose(space);
+  H5Dclose(data);
+  H5Fclose(id);
+  return values;
+}
+
+TEST(FrameFile, GivesBackEveryFloatOfEveryFrame) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene(3);
+  const FrameLayout layout = frame_layout(scene, particles);
+  const Frame frame = awkward_frame(scene, layout, 2);
+  {
+    FrameFile file = FrameFile::create(folder / "f.h5", scene, layout, {});
+    file.write(frame);
+  }
+  const auto position = floats_of(folder / "f.h5", "/fluid/position");
+  const auto velocity = floats_of(folder / "f.h5", "/fluid/velocity");
+  const auto pressure = floats_of(folder / "f.h5", "/fluid/pressure");
+  const auto wall = floats_of(folder / "f.h5", "/walls/source/vertex");
+  ASSERT_EQ(position.size(), 4u * particles * 3);
+  for (std::size_t k = 0; k < 3 * particles; ++k) {
+    EXPECT_EQ(position[2 * 3 * particles + k], frame.position[k]);
+    EXPECT_EQ(velocity[2 * 3 * particles + k], frame.velocity[k]);
+  }
+  for (std::size_t k = 0; k < particles; ++k)
+    EXPECT_EQ(pressure[2 * particles + k], frame.pressure[k]);
+  ASSERT_EQ(wall.size(), 4 * frame.wall.at(0).size());
+  EXPECT_EQ(wall[2 * frame.wall[0].size()], frame.wall[0][0]);
+}
+
+TEST(FrameFile, TellsWrittenFramesFromUnwrittenOnesByTheirTime) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene(3);
+  const FrameLayout layout = frame_layout(scene, particles);
+  FrameFile file = FrameFile::create(folder / "f.h5", scene, layout, {});
+  file.write(awkward_frame(scene, layout, 1));
+  const Eigen::VectorXd time = Hdf5Reader(folder / "f.h5").vector("/time", 4);
+  EXPECT_TRUE(std::isnan(time[0]));
+  EXPECT_EQ(time[1], scene.time_at(scene.schedule.substeps_per_frame));
+  EXPECT_TRUE(std::isnan(time[2]));
+}
+
+TEST(FrameFile, KeepsASecondPourOut) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene(3);
+  const FrameLayout layout = frame_layout(scene, particles);
+  const FrameFile file = FrameFile::create(folder / "f.h5", scene, layout, {});
+  EXPECT_THROW(FrameFile::reopen(folder / "f.h5", layout), InputError);
+}
+
+TEST(FrameFile, RefusesToContinueFramesOfAnotherShape) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene(3);
+  { FrameFile::create(folder / "f.h5", scene, frame_layout(scene, particles), {}); }
+  try {
+    FrameFile::reopen(folder / "f.h5", frame_layout(scene, particles + 1));
+    FAIL() << "must be refused";
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.key(), "/fluid/position");
+    EXPECT_EQ(error.value(), "[4, 7, 3]");
+  }
+}
+
+TEST(FrameFile, IsTheSameFileForTheSameFrames) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene(3);
+  const FrameLayout layout = frame_layout(scene, particles);
+  const Frame frame = awkward_frame(scene, layout, 0);
+  for (const char* name : {"a.h5", "b.h5"})
+    FrameFile::create(folder / name, scene, layout, {{"backend", "hash"}}).write(frame);
+  EXPECT_TRUE(text_of(folder / "a.h5") == text_of(folder / "b.h5"));
+}
+
+TEST(FrameFile, TakesAsManyBytesAsForetold) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene(40);
+  const FrameLayout layout = frame_layout(scene, particles);
+  { FrameFile::create(folder / "f.h5", scene, layout, {}); }
+  const auto size = static_cast<std::int64_t>(std::filesystem::file_size(folder / "f.h5"));
+  EXPECT_GE(size, frame_file_bytes(layout));
+  EXPECT_LE(size, frame_file_bytes(layout) + 20'000);  // HDF5's own structures and the scene
+}
+
+TEST(CsvWriter, WritesNumbersThatReadBackAsTheSameFloats) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene(3);
+  const FrameLayout layout = frame_layout(scene, particles);
+  const Frame frame = awkward_frame(scene, layout, 2);
+  CsvWriter(folder / "csv", scene, layout).write(frame);
+
+  const auto rows = csv_rows(folder / "csv/fluid_000002.csv");
+  ASSERT_EQ(rows.size(), 1u + particles);
+  EXPECT_EQ(rows[0], (std::vector<std::string>{"id", "x", "y", "z", "vx", "vy", "vz", "density",
+                                               "pressure"}));
+  for (std::size_t i = 0; i < particles; ++i) {
+    const auto& row = rows[i + 1];
+    ASSERT_EQ(row.size(), 9u);
+    EXPECT_EQ(std::stoul(row[0]), i);
+    for (std::size_t a = 0; a < 3; ++a) {
+      EXPECT_EQ(std::strtof(row[1 + a].c_str(), nullptr), frame.position[3 * i + a]);
+      EXPECT_EQ(std::strtof(row[4 + a].c_str(), nullptr), frame.velocity[3 * i + a]);
+    }
+    EXPECT_EQ(std::strtof(row[7].c_str(), nullptr), frame.density[i]);
+    EXPECT_EQ(std::strtof(row[8].c_str(), nullptr), frame.pressure[i]);
+  }
+}
+
+TEST(CsvWriter, KeepsMovingAndFixedWallsApartAndCountsTheirIdsThrough) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene(3);
+  const FrameLayout layout = frame_layout(scene, particles);
+  CsvWriter(folder / "csv", scene, layout).write(awkward_frame(scene, layout, 1));
+  const auto moving = csv_rows(folder / "csv/boundary_000001.csv");
+  const auto fixed = csv_rows(folder / "csv/boundary_static.csv");
+  const auto source = static_cast<std::size_t>(layout.walls.at(0).surface.vertex.cols());
+  const auto receiver = static_cast<std::size_t>(layout.walls.at(1).surface.vertex.cols());
+  ASSERT_EQ(moving.size(), 1 + source);
+  ASSERT_EQ(fixed.size(), 1 + receiver);
+  EXPECT_EQ(moving[1][0], "0");
+  EXPECT_EQ(fixed[1][0], std::to_string(source));
+  for (const auto& entry : std::filesystem::directory_iterator(folder / "csv"))
+    EXPECT_NE(entry.path().extension(), ".partial");
+}
+
+/// Every HDF5 reference of an XDMF text: dataset and the dimensions beside it.
+std::vector<std::pair<std::string, std::vector<std::int64_t>>> references(const std::string& xdmf) {
+  std::vector<std::pair<std::string, std::vector<std::int64_t>>> found;
+  const std::regex item(
+      "Dimensions=\"([0-9 ]+)\" NumberType=\"[A-Za-z]+\" Precision=\"[0-9]\" "
+      "Format=\"HDF\">frames.h5:([^<]+)<");
+  for (std::sregex_iterator it(xdmf.begin(), xdmf.end(), item), end; it != end; ++it) {
+    std::istringstream dims((*it)[1]);
+    found.push_back({(*it)[2], {}});
+    for (std::int64_t d; dims >> d;) found.back().second.push_back(d);
+  }
+  return found;
+}
+
+TEST(Xdmf, RefersToDatasetsThatExistWithTheirShapes) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene(3);
+  const FrameLayout layout = frame_layout(scene, particles);
+  { FrameFile::create(folder / "frames.h5", scene, layout, {}); }
+  const Hdf5Reader file(folder / "frames.h5");
+  const std::vector<double> times = {0, 0.1, 0.2, 0.3};
+  const auto fluid = references(frames_xdmf(layout, times, "frames.h5"));
+  const auto walls = references(walls_xdmf(layout, times, "frames.h5"));
+  EXPECT_EQ(fluid.size(), 4u * 5);      // frames × (position and four attributes)
+  EXPECT_EQ(walls.size(), 4u * 2 * 2);  // frames × containers × (triangles and vertices)
+  for (const auto& list : {fluid, walls})
+    for (const auto& [dataset, dims] : list) EXPECT_EQ(file.shape(dataset), dims) << dataset;
+}
+
+TEST(Xdmf, SelectsEachFrameOnceAndGivesItsTime) {
+  const Scene scene = test::falling_points_scene(3);
+  const std::string xdmf =
+      frames_xdmf(frame_layout(scene, particles), {0, 0.125, 0.25, 0.375}, "frames.h5");
+  for (const char* part : {"<Time Value=\"0.125\"/>", "<Time Value=\"0.375\"/>",
+                           ">0 0 0 1 1 1 1 7 3<", ">3 0 0 1 1 1 1 7 3<", ">3 0 1 1 1 7<"})
+    EXPECT_NE(xdmf.find(part), std::string::npos) << part;
+  EXPECT_EQ(xdmf.find(">4 0"), std::string::npos);
+}
+
+TEST(Xdmf, StartsEveryHyperSlabWithItsFrame) {
+  // ParaView keeps a geometry for as long as the first node inside its DataItem stays the same.
+  const Scene scene = test::falling_points_scene(3);
+  const std::string xdmf =
+      walls_xdmf(frame_layout(scene, particles), {0, 0.125, 0.25, 0.375}, "frames.h5");
+  std::size_t slabs = 0;
+  const std::regex slab("ItemType=\"HyperSlab\" Dimensions=\"[0-9 ]+\"><!-- frame ([0-9]) -->");
+  for (std::sregex_iterator it(xdmf.begin(), xdmf.end(), slab), end; it != end; ++it)
+    EXPECT_EQ((*it)[1], std::to_string(slabs++));
+  EXPECT_EQ(slabs, 4u);  // one moving wall
+}
+
+TEST(FrameWriter, WritesEveryFrameInOrderThoughItsQueueIsShort) {
+  std::vector<std::int64_t> written;
+  FrameWriter writer([&](const Frame& frame) { written.push_back(frame.index); }, 2);
+  for (std::int64_t k = 0; k < 100; ++k) {
+    Frame frame;
+    frame.index = k;
+    writer.push(std::move(frame));
+  }
+  writer.drain();
+  ASSERT_EQ(written.size(), 100u);
+  for (std::int64_t k = 0; k < 100; ++k) EXPECT_EQ(written[static_cast<std::size_t>(k)], k);
+}
+
+TEST(FrameWriter, HandsAFailureToTheSolverAndWritesNothingAfterIt) {
+  std::atomic<int> calls = 0;
+  FrameWriter writer([&](const Frame&) {
+    ++calls;
+    throw std::runtime_error("the disk is full");
+  });
+  writer.push({});
+  EXPECT_THROW(writer.drain(), std::runtime_error);
+  EXPECT_THROW(writer.push({}), std::runtime_error);
+  EXPECT_EQ(calls, 1);
+}
+
+}  // namespace
+}  // namespace decant

@@ -1,0 +1,341 @@
+/// \file
+/// A pour that is stopped, killed or failed, and what it leaves behind.
+#include "tools/pour.hpp"
+
+#include "oracle/fixture.hpp"
+#include "oracle/hdf5_io.hpp"
+#include "oracle/reference_backend.hpp"
+#include "reference/error.hpp"
+#include "tests/falling_points.hpp"
+#include "tools/checkpoint.hpp"
+#include "tools/commands.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+
+namespace decant {
+namespace {
+
+namespace fs = std::filesystem;
+using test::FallingPoints;
+using test::TemporaryFolder;
+
+PourOptions quiet_options(const fs::path& out) {
+  PourOptions options;
+  options.out = out;
+  options.quiet = true;
+  return options;
+}
+
+std::string bytes_of(const fs::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file).rdbuf();
+  return text.str();
+}
+
+/// Compares files without printing them.
+::testing::AssertionResult same_bytes(const fs::path& a, const fs::path& b) {
+  const std::string one = bytes_of(a), other = bytes_of(b);
+  const auto at = std::mismatch(one.begin(), one.end(), other.begin(), other.end());
+  if (at.first == one.end() && at.second == other.end()) return ::testing::AssertionSuccess();
+  return ::testing::AssertionFailure()
+         << a << " and " << b << " differ from byte " << at.first - one.begin() << " on";
+}
+
+/// Columns that say how the fluid moved, and not how long that took.
+void expect_same_timeline(const fs::path& a, const fs::path& b) {
+  const Hdf5Reader one(a), other(b);
+  for (const char* column : {"/time", "/kinetic_energy", "/max_density", "/deepest", "/mass/source",
+                             "/mass/in_flight", "/mass/receiver"})
+    EXPECT_EQ(one.vector(column), other.vector(column)) << column;
+  for (const char* column : {"/substep", "/inside", "/crossed", "/particles/receiver"})
+    EXPECT_EQ(one.integers(column), other.integers(column)) << column;
+}
+
+/// Pours in a child that is gone, without a word, when `backend` reaches the substep.
+void pour_until_killed(const Scene& scene, Backend& backend, const PourOptions& options) {
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    try {
+      pour(scene, backend, options);
+    } catch (...) {
+    }
+    ::_exit(0);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL);
+}
+
+TEST(Pour, LeavesWholeFilesAndNoTraceOfTheWork) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene();
+  FallingPoints backend;
+  const PourResult result = pour(scene, backend, quiet_options(folder / "out"));
+  EXPECT_TRUE(result.finished);
+  EXPECT_EQ(result.summary.substeps, 60);
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder / "out"))
+    names.push_back(entry.path().filename().string());
+  std::sort(names.begin(), names.end());
+  EXPECT_EQ(names,
+            (std::vector<std::string>{"frames.h5", "frames.xdmf", "timeline.h5", "walls.xdmf"}));
+}
+
+TEST(Pour, AccountsForAllMassAtEveryFrame) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene();
+  FallingPoints backend;
+  const PourResult result = pour(scene, backend, quiet_options(folder / "out"));
+  EXPECT_TRUE(result.summary.balanced());
+  double mass = 0;
+  for (const double m : result.summary.mass_at) mass += m;
+  EXPECT_NEAR(mass, 6 * 6 * 5 * scene.particle_mass(), 1e-12);
+  EXPECT_EQ(result.timeline.rows.size(), 13u);
+}
+
+TEST(Pour, StoppedAndResumedEndsInTheSameBits) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene();
+  FallingPoints whole, first, second;
+  pour(scene, whole, quiet_options(folder / "whole"));
+
+  PourOptions options = quiet_options(folder / "parts");
+  int frames = 0;
+  options.stop = [&] { return frames++ == 5; };
+  const PourResult stopped = pour(scene, first, options);
+  EXPECT_FALSE(stopped.finished);
+  EXPECT_EQ(stopped.frame, 5);
+  EXPECT_FALSE(fs::exists(folder / "parts/frames.h5"));
+  options.resume = true;
+  options.stop = {};
+  const PourResult resumed = pour(scene, second, options);
+  EXPECT_TRUE(resumed.finished);
+  EXPECT_TRUE(same_bytes(folder / "whole/frames.h5", folder / "parts/frames.h5"));
+  EXPECT_TRUE(same_bytes(folder / "whole/frames.xdmf", folder / "parts/frames.xdmf"));
+  expect_same_timeline(folder / "whole/timeline.h5", folder / "parts/timeline.h5");
+  EXPECT_EQ(resumed.timeline.stages.integrate.calls, 60);
+}
+
+TEST(Pour, KilledAnywhereLeavesReadableFramesAndResumesToTheSameBits) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene();
+  FallingPoints whole;
+  pour(scene, whole, quiet_options(folder / "whole"));
+  for (const std::int64_t deadly : {0, 15, 40, 55}) {
+    const fs::path out = folder / ("out" + std::to_string(deadly));
+    FallingPoints dying, second;
+    dying.before_advance = [&](std::int64_t substep) {
+      if (substep == deadly) ::raise(SIGKILL);
+    };
+    PourOptions options = quiet_options(out);
+    options.checkpoint_seconds = deadly == 40 ? 0.0 : 30.0;
+    pour_until_killed(scene, dying, options);
+
+    EXPECT_FALSE(fs::exists(out / "frames.h5"));
+    EXPECT_EQ(Hdf5Reader(out / "frames.h5.partial").vector("/time", 13)[0], 0.0);
+    const Checkpoint checkpoint = read_checkpoint(out / "checkpoint.h5");
+    EXPECT_EQ(checkpoint.frame, deadly == 40 ? 8 : 0);
+    options.resume = true;
+    EXPECT_TRUE(pour(scene, second, options).finished);
+    EXPECT_TRUE(same_bytes(out / "frames.h5", folder / "whole/frames.h5"));
+  }
+}
+
+TEST(Pour, KilledWhileNamingItsFilesResumesAllTheSame) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene();
+  FallingPoints whole, second;
+  PourOptions options = quiet_options(folder / "out");
+  int frames = 0;
+  options.stop = [&] { return frames++ == 5; };
+  pour(scene, whole, options);
+  fs::rename(folder / "out/frames.h5.partial", folder / "out/frames.h5");
+  options.resume = true;
+  options.stop = {};
+  EXPECT_TRUE(pour(scene, second, options).finished);
+}
+
+TEST(Pour, WithTheReferenceResumesToTheSameBits) {
+  const TemporaryFolder folder;
+  Scene scene = test::falling_points_scene(4);
+  scene.schedule.end = 0.008;  // 20 substeps of 0.4 ms, as the speed of sound asks for
+  PourOptions options = quiet_options(folder / "whole");
+  pour(scene, *make_reference_backend(), options);
+  options.out = folder / "parts";
+  int frames = 0;
+  options.stop = [&] { return frames++ == 2; };
+  pour(scene, *make_reference_backend(), options);
+  options.resume = true;
+  options.stop = {};
+  EXPECT_TRUE(pour(scene, *make_reference_backend(), options).finished);
+  EXPECT_TRUE(same_bytes(folder / "whole/frames.h5", folder / "parts/frames.h5"));
+  expect_same_timeline(folder / "whole/timeline.h5", folder / "parts/timeline.h5");
+}
+
+/// The InputError of an attempt that must be refused.
+template <class Attempt>
+InputError refusal(Attempt attempt) {
+  try {
+    attempt();
+  } catch (const InputError& error) {
+    return error;
+  }
+  ADD_FAILURE() << "must be refused";
+  return {"", "", "", ""};
+}
+
+TEST(Pour, NamesWhatDiffersFromThePourToResume) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene();
+  FallingPoints backend;
+  PourOptions options = quiet_options(folder / "out");
+  options.stop = [] { return true; };
+  pour(scene, backend, options);
+  options.resume = true;
+
+  Scene thicker = scene;
+  thicker.fluid.viscosity = 0.06;
+  const InputError scene_differs = refusal([&] { pour(thicker, backend, options); });
+  EXPECT_NE(scene_differs.key().find("viscosity"), std::string::npos) << scene_differs.what();
+  EXPECT_EQ(scene_differs.value(), "0.06");
+
+  const InputError frames_differ = refusal([&] { pour(with_frames(scene, 6), backend, options); });
+  EXPECT_EQ(frames_differ.key(), "time.frames");
+
+  FallingPoints other;
+  other.info_.name = "hash";
+  EXPECT_EQ(refusal([&] { pour(scene, other, options); }).key(), "--backend");
+  other = backend;
+  other.info_.executor = "cuda";
+  EXPECT_EQ(refusal([&] { pour(scene, other, options); }).key(), "--executor");
+  options.csv = true;
+  EXPECT_EQ(refusal([&] { pour(scene, backend, options); }).key(), "--csv");
+}
+
+TEST(Pour, DoesNotOverwriteAndDoesNotResumeWhatIsComplete) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene(2);
+  FallingPoints backend;
+  PourOptions options = quiet_options(folder / "out");
+  pour(scene, backend, options);
+  EXPECT_EQ(refusal([&] { pour(scene, backend, options); }).key(), "--out");
+  options.resume = true;
+  EXPECT_EQ(refusal([&] { pour(scene, backend, options); }).key(), "--resume");
+  options.out = folder / "nothing-here";
+  EXPECT_EQ(refusal([&] { pour(scene, backend, options); }).key(), "--resume");
+}
+
+TEST(Pour, IsRefusedBeforeAnyWorkWhereTheDiskIsTooSmall) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene(1'000'000'000);
+  FallingPoints backend;
+  const InputError error = refusal([&] { pour(scene, backend, quiet_options(folder / "out")); });
+  EXPECT_EQ(error.key(), "--out");
+  EXPECT_NE(error.bound().find("needs"), std::string::npos);
+  EXPECT_NE(error.bound().find("free"), std::string::npos);
+  EXPECT_FALSE(fs::exists(folder / "out"));
+}
+
+TEST(Pour, SavesTheLastGoodStateWhereTheBackendReportsTrouble) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene();
+  FallingPoints backend;
+  backend.trouble_at = 17;
+  try {
+    pour(scene, backend, quiet_options(folder / "out"));
+    FAIL() << "must fail";
+  } catch (const BackendError& error) {
+    const std::string what = error.what();
+    EXPECT_NE(what.find("particle 3, substep 17"), std::string::npos) << what;
+    EXPECT_NE(what.find("failed-state.h5"), std::string::npos) << what;
+  }
+  const Fixture dumped = read_fixture(folder / "out/failed-state.h5");
+  EXPECT_EQ(dumped.state.substep, 15);
+  EXPECT_EQ(dumped.state.size(), 6 * 6 * 5);
+}
+
+TEST(Pour, WritesCsvFramesBesideTheOthers) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene(3);
+  FallingPoints backend;
+  PourOptions options = quiet_options(folder / "out");
+  options.csv = true;
+  pour(scene, backend, options);
+  for (const char* name :
+       {"fluid_000000.csv", "fluid_000003.csv", "boundary_000003.csv", "boundary_static.csv"})
+    EXPECT_TRUE(fs::exists(folder / "out/csv" / name)) << name;
+}
+
+/// What `decant pour …` throws or leaves as its exit status.
+int pour_command(const std::vector<std::string>& arguments) {
+  CLI::App app;
+  int status = -1;
+  add_pour_command(app, status);
+  std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
+  reversed.push_back("pour");
+  app.parse(reversed);
+  return status;
+}
+
+TEST(PourCommand, RefusesOptionsOutOfRangeNamingThemAndTheirBounds) {
+  const TemporaryFolder folder;
+  const std::string scene = std::string(DECANT_SOURCE_DIR) + "/fixtures/scenes/pour-4k.json";
+  const std::vector<std::string> base = {scene, "--quiet", "--out", folder / "out"};
+  const auto with = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> all = base;
+    all.insert(all.end(), more.begin(), more.end());
+    return refusal([&] { pour_command(all); });
+  };
+  EXPECT_EQ(with({"--frames", "0"}).key(), "--frames");
+  EXPECT_EQ(with({"--particles", "-5"}).value(), "-5");
+  EXPECT_EQ(with({"--backend", "hsah"}).key(), "--backend");
+  EXPECT_EQ(with({"--executor", "gpu"}).key(), "--executor");
+  EXPECT_EQ(with({"--backend", "reference", "--executor", "cuda"}).key(), "--executor");
+  EXPECT_THROW(pour_command({scene}), CLI::ParseError);
+  EXPECT_THROW(pour_command({scene, "--out", folder / "out", "--colour"}), CLI::ParseError);
+  EXPECT_FALSE(fs::exists(folder / "out"));
+}
+
+TEST(Summary, SeesMassThatDoesNotAddUpAndTheFirstPenetration) {
+  Timeline timeline;
+  timeline.rows.resize(4);
+  for (std::int64_t f = 0; f < 4; ++f) {
+    TimelineRow& row = timeline.rows[static_cast<std::size_t>(f)];
+    row.frame = f;
+    row.particles_at = {10, 0, 0, 0, 0};
+    row.mass_at = {10 * 0.25, 0, 0, 0, 0};
+    row.kinetic_energy = f == 1 ? 3.0 : 1.0;
+  }
+  EXPECT_TRUE(summarise(timeline, 10, 0.25).balanced());
+  EXPECT_FALSE(summarise(timeline, 10, 0.25).penetrated());
+  timeline.rows[3].particles_at[0] = 9;
+  timeline.rows[2].mass_at[0] = 10 * 0.25 * (1 + 1e-12);
+  timeline.rows[2].crossed = 1;
+  timeline.rows[2].first_crossed = 7;
+  timeline.rows[3].inside = 2;
+  const PourSummary summary = summarise(timeline, 10, 0.25);
+  EXPECT_EQ(summary.unbalanced_frames, 2);
+  EXPECT_EQ(summary.penetration_frame, 2);
+  EXPECT_EQ(summary.penetration_particle, 7);
+  EXPECT_EQ(summary.peak_kinetic_energy, 3.0);
+}
+
+TEST(WithFrames, KeepsTheTimeAndNeverLengthensASubstepThatTheSceneSets) {
+  Scene scene = test::falling_points_scene(12);  // 60 substeps
+  scene.schedule.substeps_derived = false;
+  for (const int frames : {1, 5, 7, 12, 59, 60, 61, 1000}) {
+    const Scene other = with_frames(scene, frames);
+    EXPECT_EQ(other.schedule.frames, frames);
+    EXPECT_EQ(other.schedule.end, scene.schedule.end);
+    EXPECT_LE(other.time_step(), scene.time_step() * (1 + 1e-15));
+  }
+}
+
+}  // namespace
+}  // namespace decant

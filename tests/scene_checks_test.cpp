@@ -1,0 +1,350 @@
+/// \file
+/// What a scene checks on itself, and the numbers it derives.
+#include "reference/scene_checks.hpp"
+
+#include "reference/distance.hpp"
+#include "reference/error.hpp"
+#include "reference/initial_state.hpp"
+#include "reference/pose.hpp"
+#include "reference/sampling.hpp"
+#include "reference/scene_file.hpp"
+#include "reference/shapes.hpp"
+#include "reference/sweep.hpp"
+
+#include <gtest/gtest.h>
+#include <rapidcheck.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+
+namespace decant {
+namespace {
+
+const std::filesystem::path scenes = std::filesystem::path(DECANT_SOURCE_DIR) / "fixtures/scenes";
+
+Scene pour() { return load_scene(scenes / "pour-4k.json"); }
+Scene channel() { return load_scene(scenes / "channel-periodic.json"); }
+Scene dam() { return load_scene(scenes / "dam-break.json"); }
+
+/// A cup or a peg, where a test needs one solid more.
+Container cup_at(const Vec3& origin) {
+  return {"third", cup_shape(0.02, 0.03, 0.009), origin, 0.009, {}};
+}
+
+/// A sound scene made wrong: the refusal names `key`, and value and bound hold the texts.
+struct Unsound {
+  const char* what;
+  std::function<Scene()> base;
+  std::function<void(Scene&)> change;
+  const char *key, *value, *bound;
+};
+
+void PrintTo(const Unsound& scene, std::ostream* out) { *out << scene.what; }
+
+const double nan = std::numeric_limits<double>::quiet_NaN();
+
+const Unsound unsound[] = {
+    {"SpacingNotANumber", pour, [](Scene& s) { s.particle_spacing = nan; }, "particle_spacing",
+     "nan", "> 0"},
+    {"SupportBelowOneAndAHalf", pour, [](Scene& s) { s.support_ratio = 1.4; }, "support_ratio",
+     "1.4", ">= 1.5"},
+    {"DomainBeyondSinglePrecision", pour, [](Scene& s) { s.domain.max.x() = 100; }, "domain",
+     "100.0", "single precision"},
+    {"PeriodBelowThreeSupports", channel, [](Scene& s) { s.domain.max.y() = 0.005; },
+     "domain.periodic", "y", "a period >= 3 H = 0.006"},
+    {"TwoContainersOfOneName", pour, [](Scene& s) { s.containers[1].name = "source"; },
+     "containers[1].name", "source", "containers[0] has it already"},
+    {"WallThinnerThanSupport", pour, [](Scene& s) { s.containers[1].wall_thickness = 0.007; },
+     "containers[1].wall_thickness", "0.007", ">= H = 0.0077"},
+    {"WallLayersLeaveTheSolid", pour, [](Scene& s) { s.wall_layers = 3; },
+     "containers[0].wall_thickness", "0.009", "wall_layers · dx = 0.01155"},
+    {"TiltKeysOutOfOrder", pour, [](Scene& s) { s.containers[0].tilt->keys[1].time = 0.2; },
+     "containers[0].tilt.keys[1].time", "0.2", "later than the key before it"},
+    {"TiltAxisNoUnit", pour, [](Scene& s) { s.containers[0].tilt->axis *= 2; },
+     "containers[0].tilt.axis", "(0.0, 2.0, 0.0)", "a unit vector"},
+    {"TiltPivotOutsideDomain", pour, [](Scene& s) { s.containers[0].tilt->pivot.x() = 3; },
+     "containers[0].tilt.pivot", "(3.0, 0.0, 0.129)", "a point in the domain"},
+    {"TiltLeavesDomain", pour, [](Scene& s) { s.domain.min.x() = -0.16; }, "containers[0].tilt",
+     "source reaches x = -0.165", ">= -0.16, the domain's end"},
+    {"ContainerOutsideDomain", pour, [](Scene& s) { s.domain.max.x() = 0.09; },
+     "containers[1].origin", "receiver reaches x = 0.0975", "<= 0.09, the domain's end"},
+    {"ContainerBelowFloor", pour, [](Scene& s) { s.floor->height = 0.001; }, "containers[1].origin",
+     "receiver reaches z = 0.0", ">= 0.001, the floor's height"},
+    {"TiltReachesBelowFloor", pour,
+     [](Scene& s) {
+       s.containers[0].tilt->pivot = s.containers[0].origin;
+       s.domain.min.z() = -0.05;
+     },
+     "containers[0].tilt", "source reaches z = -0.02679", ">= 0.0, the floor's height"},
+    {"CupsOverlapAtTheStart", pour, [](Scene& s) { s.containers[1].origin.x() -= 0.012; },
+     "containers[1]", "receiver and source overlap by 0.003 at t = ", "apart by >= H = 0.0077"},
+    {"CupsWithinSupport", pour, [](Scene& s) { s.containers[1].origin.x() -= 0.0015; },
+     "containers[1]", "receiver and source are 0.0075", "apart by >= H = 0.0077"},
+    {"CupsMeetDuringTheTilt", pour,
+     [](Scene& s) {
+       s.containers.push_back(cup_at({-0.16, 0, 0.15}));
+     },
+     "containers[2]", "third and source overlap by", "at all times"},
+    {"CupInsideTheSolidOfAnother", pour,
+     [](Scene& s) {
+       s.containers.push_back(cup_at({0.0385, 0, 0.02}));
+     },
+     "containers[2]", "third and receiver are 0.002", "apart by >= H"},
+    {"TankShorterThanThePeriod", channel,
+     [](Scene& s) { std::get<BoxShape>(s.containers[0].shape).solid[1].max.x() = 0.009; },
+     "containers[0]", "x from 0.0 to 0.009", "exactly the period, from 0.0 to 0.01"},
+    {"TiltInAPeriodicDomain", channel,
+     [](Scene& s) {
+       s.containers[0].tilt = Tilt{Vec3::Zero(), Vec3::UnitX(), {{0, 0}, {1, 1}}};
+     },
+     "containers[0].tilt", "tilts", "the domain is periodic along x"},
+    {"CupAtAPeriodicBoundary", pour,
+     [](Scene& s) {
+       s.containers[0].tilt.reset();
+       s.domain.periodic[0] = true;
+       s.domain.max.x() = 0.1;
+     },
+     "containers[1].origin", "receiver reaches x = 0.0975", "H inside the periodic boundary"},
+    {"LevelAboveTheCup", pour, [](Scene& s) { s.fills[0].level = 0.091; }, "fill[0].level", "0.091",
+     "<= 0.09, the inner height of source"},
+    {"LevelAboveTheTank", channel, [](Scene& s) { s.fills[0].level = 0.021; }, "fill[0].level",
+     "0.021", "<= 0.02, the inner height of plates"},
+    {"BoxOutsideItsTank", dam, [](Scene& s) { s.fills[0].box->max.x() = 0.31; }, "fill[0].box",
+     "x 0.0 to 0.31", "within the cavity of tank, x 0.0 to 0.3"},
+    {"BoxThroughAnObstacle", dam,
+     [](Scene& s) {
+       std::get<BoxShape>(s.containers[0].shape)
+           .solid.push_back({{0.05, 0, 0}, {0.07, 0.05, 0.02}});
+     },
+     "fill[0].box", "x 0.0 to 0.06", "where a box stands at x 0.05 to 0.07"},
+    {"BoxCornersOutsideItsCup", pour,
+     [](Scene& s) {
+       s.fills[0].box = SolidBox{{-0.02, -0.03, 0}, {0.02, 0.03, 0.05}};
+     },
+     "fill[0].box", "x -0.02 to 0.02", "r <= 0.035"},
+    {"BoxAboveItsCup", pour,
+     [](Scene& s) {
+       s.fills[0].box = SolidBox{{-0.02, -0.02, 0.05}, {0.02, 0.02, 0.1}};
+     },
+     "fill[0].box", "z 0.05 to 0.1", "z from 0.0 to 0.09, the cavity of source"},
+    {"FreeBoxOutsideDomain", pour,
+     [](Scene& s) {
+       s.fills.push_back({"", 0, SolidBox{{0.4, 0, 0}, {0.6, 0.1, 0.1}}, {}});
+     },
+     "fill[1].box", "x 0.4 to 0.6", "within the domain, x -0.5 to 0.5"},
+    {"FreeBoxBelowFloor", pour,
+     [](Scene& s) {
+       s.fills.push_back({"", 0, SolidBox{{0.2, 0, -0.01}, {0.3, 0.1, 0.1}}, {}});
+     },
+     "fill[1].box.min[2]", "-0.01", ">= 0.0, the floor's height"},
+    {"FreeBoxThroughACup", pour,
+     [](Scene& s) {
+       s.fills.push_back({"", 0, SolidBox{{0.02, 0, 0.05}, {0.12, 0.05, 0.1}}, {}});
+     },
+     "fill[1]", "a particle at (", "from every wall"},
+    {"FreeBoxThroughATank", dam,
+     [](Scene& s) {
+       s.fills.push_back({"", 0, SolidBox{{0.2, 0, 0.1}, {0.31, 0.05, 0.2}}, {}});
+     },
+     "fill[1].box", "x 0.2 to 0.31", "clear of the walls of tank"},
+    {"FillsThatOverlap", dam,
+     [](Scene& s) {
+       s.fills.push_back({"", 0, SolidBox{{0.05, 0, 0.1}, {0.2, 0.05, 0.2}}, {}});
+     },
+     "fill[1]", "from one of fill[0]", "fills that do not overlap"},
+    {"FillWithoutRoomForAParticle", pour, [](Scene& s) { s.fills[0].level = 0.003; }, "fill[0]",
+     "no particle", "room for at least one"},
+    {"SoundSlowerThanFourTimesTheFall", pour, [](Scene& s) { s.fluid.sound_speed = 8; },
+     "fluid.sound_speed", "8.0", ">= 4 v_max = 8.33"},
+    {"SubstepBeyondCfl", pour, [](Scene& s) { s.schedule.substeps_per_frame = 20; },
+     "time.substeps_per_frame", "20", "the CFL limit 0.4 h / (c0 + v_max)"},
+    {"SubstepBeyondCflHoweverCourantAsks", pour, [](Scene& s) { s.schedule.courant = 0.5; },
+     "time.courant", "0.5", "(0, 0.4]"},
+    {"SubstepBeyondTheViscousLimit", pour, [](Scene& s) { s.fluid.viscosity = 20; },
+     "time.substeps_per_frame", "27", "the viscous limit 0.125 h² rho0 / mu"},
+    {"NoSubsteps", pour, [](Scene& s) { s.schedule.substeps_per_frame = 0; },
+     "time.substeps_per_frame", "0", "at least 1"},
+    {"GravityAlongAPeriodWithoutASpeed", channel, [](Scene& s) { s.schedule.max_speed.reset(); },
+     "time.max_speed", "missing", "gravity pulls along the periodic axis x"},
+};
+
+class UnsoundScene : public testing::TestWithParam<Unsound> {};
+
+TEST_P(UnsoundScene, IsRefusedWithKeyValueAndBound) {
+  const Unsound& wrong = GetParam();
+  Scene scene = wrong.base();
+  wrong.change(scene);
+  try {
+    check_scene(scene, "unsound.json");
+    ADD_FAILURE() << "was not refused";
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.file(), "unsound.json");
+    EXPECT_EQ(error.key(), wrong.key);
+    EXPECT_NE(error.value().find(wrong.value), std::string::npos) << error.what();
+    EXPECT_NE(error.bound().find(wrong.bound), std::string::npos) << error.what();
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(SceneChecks, UnsoundScene, testing::ValuesIn(unsound),
+                         [](const auto& scene) { return scene.param.what; });
+
+TEST(SceneChecks, WarnsOfSlowSoundWithTheExpectedCompression) {
+  const Scene scene = pour();
+  const auto warnings = check_scene(scene, "pour");
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("fluid.sound_speed = 10.0"), std::string::npos) << warnings[0];
+  EXPECT_NE(warnings[0].find("compress by up to 4.3"), std::string::npos) << warnings[0];
+}
+
+TEST(SceneChecks, AcceptsACupStandingOnTheFloorAndNoLower) {
+  Scene scene = pour();
+  scene.floor->height = 0;
+  EXPECT_NO_THROW(check_scene(scene, "pour"));
+  scene.floor->height = 1e-4;
+  EXPECT_THROW(check_scene(scene, "pour"), InputError);
+}
+
+TEST(SceneChecks, AcceptsFillsThatTouch) {
+  Scene scene = dam();
+  scene.fills.push_back({"tank", 0, SolidBox{{0.06, 0, 0}, {0.12, 0.05, 0.12}}, {}});
+  EXPECT_NO_THROW(check_scene(scene, "dam"));
+}
+
+TEST(SceneChecks, ContainersASupportApartAreNotRefused) {
+  Scene scene = pour();
+  scene.containers[1].origin.x() =
+      scene.containers[0].origin.x() + 0.044 + 0.059 + scene.support_radius();
+  EXPECT_NO_THROW(check_scene(scene, "pour"));
+}
+
+TEST(ExpectedMaxSpeed, IsThatOfAFallFromTheHighestPointOfTheTilt) {
+  const Scene scene = pour();
+  // The far end of the cup's bottom is carried highest; the turn about the lip ends at 105°.
+  const double angle = 105 * std::numbers::pi / 180;
+  const double highest = 0.129 + 0.07 * std::sin(angle) - 0.09 * std::cos(angle);
+  EXPECT_NEAR(expected_max_speed(scene), std::sqrt(2 * 9.81 * highest), 0.01);
+}
+
+TEST(ExpectedMaxSpeed, OfADamIsThatOfItsHeight) {
+  EXPECT_DOUBLE_EQ(expected_max_speed(dam()), std::sqrt(2 * 9.81 * 0.12));
+}
+
+TEST(ExpectedMaxSpeed, CountsTheFirstVelocityAndYieldsToTheScene) {
+  Scene scene = dam();
+  scene.fills[0].velocity = {3, 0, 4};
+  EXPECT_DOUBLE_EQ(expected_max_speed(scene), std::sqrt(25 + 2 * 9.81 * 0.12));
+  scene.gravity.setZero();
+  EXPECT_DOUBLE_EQ(expected_max_speed(scene), 5);
+  scene.schedule.max_speed = 1.5;
+  EXPECT_EQ(expected_max_speed(scene), 1.5);
+}
+
+TEST(SubstepsFor, AreTheFewestThatTheLimitsAllow) {
+  for (const Scene& base : {pour(), channel(), dam()})
+    for (double courant : {0.4, 0.25, 0.1}) {
+      Scene scene = base;
+      scene.schedule.courant = courant;
+      const double longest = longest_time_step(scene, courant, expected_max_speed(scene));
+      scene.schedule.substeps_per_frame = substeps_for(scene);
+      EXPECT_LE(scene.time_step(), longest);
+      EXPECT_NO_THROW(check_scene(scene, "s"));
+      --scene.schedule.substeps_per_frame;
+      EXPECT_GT(scene.time_step(), longest);
+    }
+}
+
+TEST(WithParticles, ComesNearTheRequestAndStaysSound) {
+  for (const std::int64_t request : {2000, 4000, 10000, 56000}) {
+    const Scene scene = with_particles(pour(), request);
+    EXPECT_NEAR(static_cast<double>(initial_state(scene).size()) / static_cast<double>(request), 1,
+                request < 10000 ? 0.04 : 0.015)
+        << request;
+    EXPECT_EQ(scene.schedule.substeps_per_frame, substeps_for(scene));
+    if (request >= 4000) {  // below, H is more than the cups' walls
+      EXPECT_NO_THROW(check_scene(scene, "pour"));
+    }
+  }
+}
+
+TEST(WithParticles, KeepsSubstepsThatTheSceneSets) {
+  Scene scene = pour();
+  scene.schedule.substeps_derived = false;
+  scene.schedule.substeps_per_frame = 40;
+  EXPECT_EQ(with_particles(scene, 10000).schedule.substeps_per_frame, 40);
+}
+
+TEST(WithParticles, RefusesWhatIsNoNumberOfParticles) {
+  EXPECT_THROW(with_particles(pour(), 0), InputError);
+  EXPECT_THROW(with_particles(pour(), 2000000000), InputError);
+}
+
+/// The least distance over dense surfaces and many times: never below the true one.
+double sampled_approach(const Container& a, const Container& b, double end, double spacing) {
+  const Eigen::Matrix3Xd vertex = render_surface(a, spacing).vertex;
+  const SolidDistance solid(b);
+  double least = std::numeric_limits<double>::infinity();
+  for (int k = 0; k <= 100; ++k) {
+    const Pose pose_a = pose_at(a, end * k / 100), pose_b = pose_at(b, end * k / 100);
+    for (Eigen::Index i = 0; i < vertex.cols(); ++i)
+      least = std::min(least, solid.at(pose_b.to_local(pose_a.to_world(vertex.col(i)))).distance);
+  }
+  return least;
+}
+
+TEST(ClosestApproach, IsNeverMoreThanItsSlackAboveWhatSamplingFinds) {
+  EXPECT_TRUE(rc::check("branch and bound against sampling", [] {
+    const auto real = [](double low, double high) {
+      return low + (high - low) * *rc::gen::inRange(0, 1001) / 1000.0;
+    };
+    Container a = cup_at({real(-0.1, 0.1), real(-0.05, 0.05), real(0, 0.1)});
+    Container b = cup_at({0.05, 0, 0.05});
+    if (*rc::gen::arbitrary<bool>())
+      b.shape = tank_shape({0.05, 0.03, 0.04}, 0.01, {{{true, false}, {}, {}}});
+    for (Container* c : {&a, &b})
+      if (*rc::gen::arbitrary<bool>())
+        c->tilt = Tilt{{real(-0.1, 0.1), 0, 0.05},
+                       Vec3(real(0, 1), 1, 0).normalized(),
+                       {{0.1, real(-1, 1)}, {0.5, real(-3, 3)}, {1.2, real(-3, 3)}}};
+    const double slack = 1e-3, end = 1.0;
+    // Sampled points are true ones, so the least distance is not above theirs; and it is not below
+    // by more than their spacing and the way between two times.
+    const double sampled =
+        std::min(sampled_approach(a, b, end, 0.012), sampled_approach(b, a, end, 0.012));
+    const double found = closest_approach(a, b, end, 1.0, slack).distance;
+    RC_ASSERT(found <= sampled + slack);
+    RC_ASSERT(found >= sampled - 0.035);
+  }));
+}
+
+TEST(FarthestAlong, IsNeverShortOfWhatDenseTimesFind) {
+  const Scene scene = pour();
+  const Container& source = scene.containers[0];
+  const Eigen::Matrix3Xd vertex = render_surface(source, 0.002).vertex;
+  for (int axis = 0; axis < 3; ++axis)
+    for (double side : {-1.0, 1.0}) {
+      const Vec3 direction = side * Vec3::Unit(axis);
+      double sampled = -1;
+      for (int k = 0; k <= 300; ++k) {
+        const Pose pose = pose_at(source, 3.4 * k / 300);
+        for (Eigen::Index i = 0; i < vertex.cols(); ++i)
+          sampled = std::max(sampled, direction.dot(pose.to_world(vertex.col(i))));
+      }
+      EXPECT_NEAR(farthest_along(direction, solid_rings(source), &source, 3.4), sampled, 1e-4);
+    }
+}
+
+TEST(CavityRadius, OfACupIsItsInnerRadiusAboveTheBottomAndZeroInIt) {
+  const RevolvedShape cup = cup_shape(0.03, 0.05, 0.009);
+  EXPECT_DOUBLE_EQ(cavity_radius(cup, 0.02), 0.03);
+  EXPECT_EQ(cavity_radius(cup, -0.004), 0);
+  EXPECT_TRUE(std::isinf(cavity_radius(cup, 0.06)));
+  EXPECT_DOUBLE_EQ(cavity_radius(cup, 0.0, 0.05).least, 0.03);
+  EXPECT_DOUBLE_EQ(cavity_radius(cup, 0.0, 0.05).greatest, 0.03);
+  EXPECT_DOUBLE_EQ(rim_height(cup), 0.05);
+  EXPECT_DOUBLE_EQ(cavity_bottom(cup), 0.0);
+}
+
+}  // namespace
+}  // namespace decant

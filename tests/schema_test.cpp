@@ -1,0 +1,77 @@
+/// \file
+/// Fixtures and reports are what their documents say, as h5py sees them.
+#include "oracle/report.hpp"
+#include "tests/small_fixture.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+namespace decant {
+namespace {
+
+/// Exit status of tools/check_schema.py on a file; its output goes to the test's.
+int checked(const std::filesystem::path& file) {
+  const std::string root = DECANT_SOURCE_DIR;
+  const std::string command = "'" + root + "/build/venv/bin/python' '" + root +
+                              "/tools/check_schema.py' '" + file.string() + "'";
+  const int status = std::system(command.c_str());
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+class Schema : public FixtureFile {
+ protected:
+  void SetUp() override {
+    FixtureFile::SetUp();
+    const std::string python = std::string(DECANT_SOURCE_DIR) + "/build/venv/bin/python";
+    if (std::system(("'" + python + "' -c 'import h5py' 2>/dev/null").c_str()) != 0)
+      GTEST_SKIP() << "no h5py in " << python << "; ci/setup makes it";
+  }
+};
+
+TEST_F(Schema, ASmallFixtureIsAsDocumented) { EXPECT_EQ(checked(file_), 0); }
+
+TEST_F(Schema, AStudyScaleFixtureIsAsDocumented) {
+  Fixture study = small_fixture();
+  reduce_to_sample(study, 10);
+  write_fixture(file_, study);
+  EXPECT_EQ(checked(file_), 0);
+}
+
+TEST_F(Schema, AReportIsAsDocumented) {
+  Report report;
+  report.provenance = {{"version", "0"}};
+  report.rows.resize(3);
+  report.rows[0].verdict = Verdict::pass;
+  CheckRow& whole = report.rows[1];
+  whole.verdict = Verdict::fail;
+  whole.unit = "Pa";
+  whole.error = Eigen::VectorXd::Constant(9, 2.0);
+  whole.tolerances = Eigen::VectorXd::Constant(9, 1.0);
+  report.rows[2] = whole;
+  report.rows[2].error = Eigen::VectorXd::Constant(2'000'000, 2.0);
+  report.rows[2].tolerances = Eigen::VectorXd::Constant(2'000'000, 1.0);
+  write_report(file_, report);
+  EXPECT_EQ(checked(file_), 0);
+  write_report(file_, {});
+  EXPECT_EQ(checked(file_), 0);
+}
+
+TEST_F(Schema, WhatIsNotAsDocumentedIsFound) {
+  const std::string good = bytes();
+  const auto n = static_cast<hsize_t>(small_fixture().state.size());
+  remove("/oracle/density");
+  EXPECT_EQ(checked(file_), 1);
+  replace_bytes(good);
+  reshape("/state/velocity", {n, 3});
+  EXPECT_EQ(checked(file_), 1);
+  replace_bytes(good);
+  reshape("/condition/density", {n + 1});
+  EXPECT_EQ(checked(file_), 1);
+  replace_bytes("not HDF5");
+  EXPECT_EQ(checked(file_), 2);
+}
+
+}  // namespace
+}  // namespace decant

@@ -1,0 +1,48 @@
+/// \file
+/// Looks names up and asks executors whether they are there.
+#include "tools/backend_choice.hpp"
+
+#include "gpu/backends.hpp"
+#include "oracle/reference_backend.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+namespace decant {
+namespace {
+
+[[noreturn]] void refuse(const char* option, const std::string& value, const std::string& bound) {
+  throw InputError("command line", option, value, bound);
+}
+
+Executor executor_of(const std::string& name) {
+  if (name != "auto" && name != "cuda" && name != "host")
+    refuse("--executor", name, "must be auto, cuda or host");
+  if (name == "host") return Executor::host;
+  std::string why_not;
+  if (executor_available(Executor::cuda, &why_not)) return Executor::cuda;
+  if (name == "cuda") throw DeviceAbsent("executor cuda is not available: " + why_not);
+  return Executor::host;
+}
+
+}  // namespace
+
+std::vector<std::string> backend_choices() {
+  std::vector<std::string> names = backend_names();
+  names.insert(names.begin(), "reference");
+  return names;
+}
+
+std::unique_ptr<Backend> choose_backend(const std::string& name, const std::string& executor) {
+  const auto choices = backend_choices();
+  if (std::find(choices.begin(), choices.end(), name) == choices.end())
+    refuse("--backend", name, fmt::format("must be one of {}", fmt::join(choices, ", ")));
+  if (name != "reference") return make_backend(name, executor_of(executor));
+  if (executor == "cuda") refuse("--executor", executor, "the reference runs on the host only");
+  if (executor != "auto" && executor != "host") (void)executor_of(executor);
+  return make_reference_backend();
+}
+
+}  // namespace decant

@@ -1,0 +1,28 @@
+/// \file
+/// From --backend and --executor to a solver.
+#pragma once
+
+#include "oracle/backend.hpp"
+#include "reference/error.hpp"
+
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace decant {
+
+/// The executor that was asked for has no device here. Exit status 77.
+class DeviceAbsent : public BackendError {
+ public:
+  using BackendError::BackendError;
+};
+
+/// What --backend accepts: "reference" and the table of backends under test.
+std::vector<std::string> backend_choices();
+
+/// The backend of that name. \param executor  "auto" (cuda where there is a device, else host),
+/// "cuda" or "host"; the reference runs on the host only
+/// Throws InputError for an unknown name, DeviceAbsent where the executor has no device.
+std::unique_ptr<Backend> choose_backend(const std::string& name, const std::string& executor);
+
+}  // namespace decant

@@ -1,0 +1,32 @@
+/// \file
+/// The verbs of the `decant` command. Each adds its options to the app and runs when the app has
+/// parsed its name; what it found out is left in the exit status.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace decant {
+
+/// What the command's exit statuses mean.
+enum ExitStatus : int {
+  exit_pass = 0,
+  exit_does_not_conform = 1,
+  exit_bad_input = 2,
+  exit_failure = 3,         // of a backend or a device, or something asked for could not run
+  exit_device_absent = 77,  // CTest counts it as skipped
+};
+
+/// `decant pour`: runs a scene and writes frames, timeline and mass by place. Exit status 1 where
+/// mass does not add up or a particle passed a wall; 130 or 143 where a signal stopped it.
+void add_pour_command(CLI::App& app, int& exit_status);
+
+/// `decant info`: version, build, executors, libraries.
+void add_info_command(CLI::App& app, int& exit_status);
+
+/// `decant conform`: the conformance suite.
+void add_conform_command(CLI::App& app, int& exit_status);
+
+/// `decant record`: runs the oracle and writes a fixture.
+void add_record_command(CLI::App& app, int& exit_status);
+
+}  // namespace decant

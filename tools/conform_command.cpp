@@ -1,0 +1,226 @@
+/// \file
+/// `decant conform`: every asked-for backend on every asked-for fixture, a table, a report, a
+/// status.
+#include "oracle/conform.hpp"
+#include "reference/error.hpp"
+#include "tools/backend_choice.hpp"
+#include "tools/commands.hpp"
+#include "tools/fixture_folder.hpp"
+#include "tools/progress.hpp"
+#include "version.hpp"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace decant {
+namespace {
+
+struct ConformArguments {
+  std::vector<std::string> fixtures, backends;
+  std::string executor = "auto", report;
+  bool all = false, json = false, quiet = false;
+};
+
+constexpr const char* footer =
+    "Without FIXTURE the small recordings beside the binary are judged (or those in the folder "
+    "that\n"
+    "DECANT_FIXTURES names), with --all every one. A check passes where no error exceeds its own\n"
+    "tolerance: score = largest |error| / tolerance <= 1.\n"
+    "Exit status: 0 all pass, 1 something does not conform, 2 bad input, 3 something could not "
+    "run,\n"
+    "77 the device of --executor is absent.\n"
+    "\n"
+    "Example:\n"
+    "  decant conform --backend hash,list --report build/conform.h5";
+
+/// A backend that was asked for, or why it is not there.
+struct Candidate {
+  std::unique_ptr<Backend> backend;
+  BackendInfo info;
+  std::string why_not;
+  bool device_absent = false;
+};
+
+Candidate candidate_of(const std::string& name, const std::string& executor) {
+  Candidate c;
+  c.info.name = name;
+  c.info.executor = executor;
+  try {
+    c.backend = choose_backend(name, executor);
+    c.info = c.backend->info();
+  } catch (const DeviceAbsent& error) {
+    c.why_not = error.what();
+    c.device_absent = true;
+  } catch (const BackendError& error) {
+    c.why_not = error.what();
+  }
+  return c;
+}
+
+std::vector<Candidate> candidates_of(const ConformArguments& arguments) {
+  std::vector<std::string> names = arguments.backends;
+  if (names.empty()) {
+    names = backend_choices();
+    std::erase(names, "reference");
+  }
+  if (names.empty())
+    throw InputError("command line", "--backend", "none", "this build has no backend under test");
+  std::set<std::string> seen;
+  std::vector<Candidate> candidates;
+  for (const auto& name : names) {
+    if (!seen.insert(name).second)
+      throw InputError("command line", "--backend", name, "each backend once");
+    candidates.push_back(candidate_of(name, arguments.executor));
+  }
+  return candidates;
+}
+
+/// All are read before the first is judged: a bad one is refused before any work.
+std::vector<Fixture> fixtures_of(const ConformArguments& arguments) {
+  std::vector<std::filesystem::path> files(arguments.fixtures.begin(), arguments.fixtures.end());
+  if (!files.empty() && arguments.all)
+    throw InputError("command line", "--all", "given", "either --all or FIXTURE");
+  if (files.empty()) files = fixtures_in(fixture_folder(), arguments.all);
+  std::vector<Fixture> fixtures;
+  for (const auto& file : files) fixtures.push_back(read_fixture(file));
+  return fixtures;
+}
+
+CheckRow row_that_did_not_run(const Candidate& candidate, const Fixture& fixture) {
+  CheckRow row;
+  row.backend = candidate.info.name;
+  row.executor = candidate.info.executor;
+  row.device = candidate.info.device;
+  row.fixture = fixture.name;
+  row.check = "all";
+  row.reason = candidate.why_not;
+  return row;
+}
+
+Report judge_all(std::vector<Candidate>& candidates, const std::vector<Fixture>& fixtures,
+                 bool quiet) {
+  Report report;
+  const auto total = static_cast<std::int64_t>(candidates.size() * fixtures.size());
+  const bool any = std::any_of(candidates.begin(), candidates.end(),
+                               [](const Candidate& c) { return c.backend != nullptr; });
+  Progress progress("judgement", total, 0, quiet);
+  std::int64_t done = 0;
+  for (const Fixture& fixture : fixtures) {
+    std::unique_ptr<const Judgement> oracle;
+    if (any) oracle = std::make_unique<const Judgement>(prepare(fixture));
+    for (Candidate& candidate : candidates) {
+      progress.update(done++, fixture.name + " " + candidate.info.name);
+      if (!candidate.backend) {
+        report.rows.push_back(row_that_did_not_run(candidate, fixture));
+        continue;
+      }
+      for (CheckRow& row : judge(*candidate.backend, fixture, *oracle)) {
+        condense(row);
+        report.rows.push_back(std::move(row));
+      }
+    }
+  }
+  progress.update(total);
+  return report;
+}
+
+void add_provenance(Report& report, const std::vector<Candidate>& candidates,
+                    const std::vector<Fixture>& fixtures) {
+  auto& p = report.provenance;
+  p["version"] = version;
+  p["git_revision"] = git_revision;
+  p["compiler"] = compiler;
+  p["flags"] = flags;
+  p["build_type"] = build_type;
+  for (const auto& c : candidates)
+    p["device." + c.info.name] = c.backend ? c.info.executor + ": " + c.info.device : c.why_not;
+  for (const auto& f : fixtures) p["fixture_sha256." + f.name] = f.sha256;
+}
+
+/// 77 where nothing fails and all that is missing is the device that was asked for.
+int status_of(const Report& report, const std::vector<Candidate>& candidates) {
+  const int status = exit_status(report);
+  const bool only_the_device =
+      std::all_of(candidates.begin(), candidates.end(),
+                  [](const Candidate& c) { return c.backend || c.device_absent; });
+  const bool absent = std::any_of(candidates.begin(), candidates.end(),
+                                  [](const Candidate& c) { return c.device_absent; });
+  return status == exit_failure && absent && only_the_device ? exit_device_absent : status;
+}
+
+std::string json_text(const Report& report, int status) {
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  for (const auto& r : report.rows)
+    rows.push_back({{"backend", r.backend},
+                    {"options", r.options},
+                    {"executor", r.executor},
+                    {"device", r.device},
+                    {"fixture", r.fixture},
+                    {"check", r.check},
+                    {"field", r.field},
+                    {"unit", r.unit},
+                    {"n", r.n},
+                    {"value", r.value},
+                    {"tolerance", r.tolerance},
+                    {"score", r.score},
+                    {"median_score", r.median_score},
+                    {"float_score", r.float_score},
+                    {"worst_id", r.worst_id},
+                    {"excluded", r.excluded},
+                    {"verdict", to_string(judged_verdict(r))},
+                    {"reason", judged_reason(r)}});
+  const nlohmann::ordered_json all = {{"summary", verdict_line(report)},
+                                      {"exit_status", status},
+                                      {"rows", rows},
+                                      {"provenance", report.provenance}};
+  return all.dump(2);
+}
+
+int conform(const ConformArguments& arguments) {
+  auto candidates = candidates_of(arguments);
+  const auto fixtures = fixtures_of(arguments);
+  const bool talks = !arguments.quiet && !arguments.json;
+  if (talks)
+    for (const auto& c : candidates)
+      fmt::print("{}: {}\n", c.info.name,
+                 c.backend ? fmt::format("{} on {}", c.info.executor, c.info.device) : c.why_not);
+  std::fflush(stdout);
+
+  Report report = judge_all(candidates, fixtures, !talks);
+  add_provenance(report, candidates, fixtures);
+  const int status = status_of(report, candidates);
+  if (!arguments.report.empty()) write_report(arguments.report, report);
+  if (arguments.json)
+    fmt::print("{}\n", json_text(report, status));
+  else if (arguments.quiet)
+    fmt::print("{}\n", verdict_line(report));
+  else
+    fmt::print("\n{}", console_table(report));
+  return status;
+}
+
+}  // namespace
+
+void add_conform_command(CLI::App& app, int& exit_status) {
+  auto arguments = std::make_shared<ConformArguments>();
+  CLI::App* verb = app.add_subcommand("conform", "judge backends on recorded states");
+  verb->footer(footer);
+  verb->add_option("FIXTURE", arguments->fixtures, "recordings (*.h5); default: the small ones");
+  verb->add_flag("--all", arguments->all, "the study-scale recordings too");
+  verb->add_option("--backend", arguments->backends, "brute,hash,…; default: all under test")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  verb->add_option("--executor", arguments->executor, "auto, cuda or host")->capture_default_str();
+  verb->add_option("--report", arguments->report, "write an HDF5 report");
+  verb->add_flag("--json", arguments->json, "rows as JSON instead of the table");
+  verb->add_flag("--quiet", arguments->quiet, "the verdict's line alone");
+  verb->callback([arguments, &exit_status] { exit_status = conform(*arguments); });
+}
+
+}  // namespace decant

@@ -1,0 +1,59 @@
+/// \file
+/// The `decant` command: finds the verb, runs it, and turns what went wrong into one line and an
+/// exit status.
+#include "reference/error.hpp"
+#include "tools/backend_choice.hpp"
+#include "tools/commands.hpp"
+#include "version.hpp"
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+#include <exception>
+
+namespace {
+
+constexpr const char* footer =
+    "Examples:\n"
+    "  decant pour fixtures/scenes/pour-4k.json --out build/pour-4k\n"
+    "  decant conform --backend brute,hash,list\n"
+    "  decant record fixtures/scenes/pour-4k.json --out pour-4k-stream.h5\n"
+    "  decant info\n"
+    "\n"
+    "Exit status: 0 pass, 1 does not conform, 2 bad input, 3 backend or device failure,\n"
+    "77 the device asked for is absent, 128 + n stopped by signal n.";
+
+int complain(int status, const char* what) {
+  fmt::print(stderr, "decant: {}\n", what);
+  return status;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace decant;
+  int status = exit_pass;
+  CLI::App app{"Judges GPU ports of an SPH fluid solver against a sequential oracle.", "decant"};
+  app.set_version_flag("--version", std::string("decant ") + version);
+  app.require_subcommand(1);
+  app.footer(footer);
+  add_pour_command(app, status);
+  add_record_command(app, status);
+  add_conform_command(app, status);
+  add_info_command(app, status);
+  try {
+    app.parse(argc, argv);
+    return status;
+  } catch (const CLI::Success& help_or_version) {
+    return app.exit(help_or_version);
+  } catch (const CLI::ParseError& error) {
+    return complain(exit_bad_input, fmt::format("{} (decant --help)", error.what()).c_str());
+  } catch (const InputError& error) {
+    return complain(exit_bad_input, error.what());
+  } catch (const DeviceAbsent& error) {
+    return complain(exit_device_absent, error.what());
+  } catch (const std::exception& error) {
+    return complain(exit_failure, error.what());
+  }
+}

@@ -1,0 +1,42 @@
+/// \file
+/// One pour from its first frame to its last: solver, audit, frames, timeline, checkpoints. Knows
+/// no command line, so that tests can pour with any backend.
+///
+/// What lies in the output folder: frames.h5, frames.xdmf, walls.xdmf, timeline.h5, csv/ when all
+/// is done; frames.h5.partial and checkpoint.h5 as long as it is not.
+#pragma once
+
+#include "oracle/backend.hpp"
+#include "reference/scene.hpp"
+#include "tools/timeline.hpp"
+
+#include <filesystem>
+#include <functional>
+
+namespace decant {
+
+struct PourOptions {
+  std::filesystem::path out;
+  bool csv = false, resume = false, quiet = false;
+  double checkpoint_seconds = 30;  // s, wall time between checkpoints; 0: at every frame
+  std::function<bool()> stop;      // asked after every frame; true: leave a checkpoint and return
+};
+
+struct PourResult {
+  bool finished = false;   // false: stopped, a checkpoint lies in the folder
+  std::int64_t frame = 0;  // the last one written
+  Timeline timeline;
+  PourSummary summary;
+};
+
+/// Pours. Throws InputError where the folder holds another pour or the disk has no room;
+/// BackendError where the backend reports trouble, naming particle and substep, after dumping the
+/// last good state to failed-state.h5 in the folder; std::runtime_error where a file cannot be
+/// written.
+PourResult pour(const Scene& scene, Backend& backend, const PourOptions& options);
+
+/// The scene written in `frames` frames over the same time. Substeps that the scene sets become as
+/// many as keep each of them no longer than it was; derived ones are derived anew.
+Scene with_frames(Scene scene, int frames);
+
+}  // namespace decant

@@ -1,0 +1,191 @@
+/// \file
+/// `decant record`: runs a scene to its phases and writes the oracle's answer at each.
+#include "oracle/conform.hpp"
+#include "oracle/hdf5_io.hpp"
+#include "reference/error.hpp"
+#include "reference/initial_state.hpp"
+#include "reference/sampling.hpp"
+#include "reference/scene_file.hpp"
+#include "tools/backend_choice.hpp"
+#include "tools/checkpoint.hpp"
+#include "tools/commands.hpp"
+#include "tools/phases.hpp"
+#include "tools/progress.hpp"
+#include "version.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace decant {
+namespace {
+
+struct RecordArguments {
+  std::string scene, out, from, backend = "reference", executor = "auto";
+  std::vector<std::string> phases;
+  bool sample = false, quiet = false;
+};
+
+constexpr const char* footer =
+    "Phases: start, settled, tilt-onset, stream, splash, filling, rest, at times that follow from "
+    "the\n"
+    "scene's tilt, or NAME=TIME (s). Several phases, or none, with {phase} in --out: one file "
+    "each.\n"
+    "Positions and velocities are rounded to fp32; the fields are always the oracle's, whatever\n"
+    "backend moved the fluid.\n"
+    "\n"
+    "Example:\n"
+    "  decant record fixtures/scenes/pour-4k.json --out 'fixtures/pour-4k-{phase}.h5'";
+
+/// Where the run starts.
+struct Start {
+  ParticleState state;
+  std::string phase;   // of a fixture, else empty
+  std::string origin;  // for the provenance
+};
+
+Start start_of(const RecordArguments& arguments, const Scene& scene) {
+  if (arguments.from.empty()) return {initial_state(scene), {}, "the scene's initial state"};
+  const std::string& file = arguments.from;
+  const auto take = [&](ParticleState state, const std::string& scene_json, std::string phase) {
+    if (scene_json != scene_to_json(scene))
+      throw InputError(file, "scene", "another scene", "the scene of " + arguments.scene);
+    return Start{std::move(state), std::move(phase),
+                 std::filesystem::path(file).filename().string() + " " + sha256_of_file(file)};
+  };
+  if (Hdf5Reader(file).has_attribute("/", "decant_fixture")) {
+    Fixture fixture = read_fixture(file);
+    return take(std::move(fixture.state), scene_to_json(fixture.scene), fixture.phase);
+  }
+  Checkpoint checkpoint = read_checkpoint(file);
+  return take(std::move(checkpoint.state), checkpoint.scene_json, {});
+}
+
+std::vector<Phase> phases_of(const RecordArguments& arguments, const Scene& scene,
+                             const Start& start) {
+  const bool named_by_phase = arguments.out.find("{phase}") != std::string::npos;
+  std::vector<Phase> phases;
+  for (const auto& text : arguments.phases) phases.push_back(parse_phase(scene, text));
+  if (phases.empty() && !arguments.from.empty())
+    phases.push_back({start.phase.empty() ? "state" : start.phase, start.state.substep});
+  if (phases.empty() && named_by_phase)
+    for (const char* name : {"settled", "tilt-onset", "stream", "splash", "filling", "rest"})
+      phases.push_back(parse_phase(scene, name));
+  if (phases.empty()) phases.push_back(parse_phase(scene, "rest"));
+
+  if (phases.size() > 1 && !named_by_phase)
+    throw InputError("command line", "--out", arguments.out, "{phase} in it, for several phases");
+  std::stable_sort(phases.begin(), phases.end(),
+                   [](const Phase& a, const Phase& b) { return a.substep < b.substep; });
+  for (std::size_t k = 0; k < phases.size(); ++k) {
+    if (phases[k].substep < start.state.substep)
+      throw InputError(
+          "command line", "--phase", phases[k].name,
+          fmt::format("at or after {}, substep {}", start.origin, start.state.substep));
+    for (std::size_t earlier = 0; earlier < k; ++earlier)
+      if (phases[earlier].name == phases[k].name)
+        throw InputError("command line", "--phase", phases[k].name, "each name once");
+  }
+  return phases;
+}
+
+void check_place(const std::string& out) {
+  const auto folder = std::filesystem::absolute(out).parent_path();
+  if (!std::filesystem::is_directory(folder))
+    throw InputError("command line", "--out", out, "a file in a folder that exists");
+}
+
+void advance_to(std::int64_t target, std::int64_t& now, const Scene& scene, Backend& backend,
+                Progress& progress, const std::string& phase) {
+  const std::int64_t per_frame = scene.schedule.substeps_per_frame;
+  while (now < target) {
+    // As `pour` does, whole frames at a time: backends rebuild their neighbors at frame starts.
+    const std::int64_t chunk = std::min(target - now, per_frame - now % per_frame);
+    const Status status = backend.advance(static_cast<int>(chunk));
+    if (!status.ok())
+      throw BackendError(
+          fmt::format("{} on the way to {}: {}", backend.info().name, phase, describe(status)));
+    now += chunk;
+    progress.update(now, phase);
+  }
+}
+
+std::map<std::string, std::string> provenance_of(const RecordArguments& arguments,
+                                                 const BackendInfo& info, const Start& start) {
+  return {
+      {"version", version},
+      {"git_revision", git_revision},
+      {"compiler", compiler},
+      {"flags", flags},
+      {"build_type", build_type},
+      {"scene_file", std::filesystem::path(arguments.scene).filename().string()},
+      {"started_from", start.origin},
+      {"advanced_by", info.name},
+      {"advanced_options", info.options},
+      {"advanced_executor", info.executor},
+      {"advanced_device", info.device},
+      {"advanced_precision", info.precision},
+  };
+}
+
+int record(const RecordArguments& arguments) {
+  const Scene scene = load_scene(arguments.scene);
+  const Start start = start_of(arguments, scene);
+  const auto phases = phases_of(arguments, scene, start);
+  check_place(arguments.out);
+  const auto backend = choose_backend(arguments.backend, arguments.executor);
+  const BackendInfo info = backend->info();
+  if (!arguments.quiet)
+    fmt::print("{} ({}) on {}: {} particles\n", info.name, info.precision, info.device,
+               start.state.size());
+  std::fflush(stdout);
+
+  backend->load(scene, sample_walls(scene), start.state);
+  std::int64_t now = start.state.substep;
+  Progress progress("substep", phases.back().substep, now, arguments.quiet);
+  for (const Phase& phase : phases) {
+    advance_to(phase.substep, now, scene, *backend, progress, phase.name);
+    Fixture fixture;
+    fixture.phase = phase.name;
+    fixture.scene = scene;
+    backend->read(fixture.state);
+    fixture.state.substep = now;
+    fixture.state.quantise();
+    evaluate_oracle(scene, fixture.state, fixture.fields.emplace(), fixture.condition.emplace());
+    if (arguments.sample) reduce_to_sample(fixture);
+    fixture.provenance = provenance_of(arguments, info, start);
+    const std::string file = phase_file(arguments.out, phase.name);
+    write_fixture(file, fixture);
+    progress.pause();
+    if (!arguments.quiet)
+      fmt::print("{}: {} at {:.6g} s, substep {}, {} bytes\n", file, phase.name, scene.time_at(now),
+                 now, std::filesystem::file_size(file));
+    std::fflush(stdout);
+  }
+  return exit_pass;
+}
+
+}  // namespace
+
+void add_record_command(CLI::App& app, int& exit_status) {
+  auto arguments = std::make_shared<RecordArguments>();
+  CLI::App* verb = app.add_subcommand("record", "run a scene and write fixtures");
+  verb->footer(footer);
+  verb->add_option("SCENE", arguments->scene, "scene file (*.json)")->required();
+  verb->add_option("--out", arguments->out, "file to write; {phase} in it becomes the phase's name")
+      ->required();
+  verb->add_option("--phase", arguments->phases, "NAME or NAME=TIME (s); may be repeated")
+      ->allow_extra_args(false);
+  verb->add_option("--from", arguments->from, "start from a checkpoint.h5 or a fixture");
+  verb->add_option("--backend", arguments->backend, "what moves the fluid: reference, brute, …")
+      ->capture_default_str();
+  verb->add_option("--executor", arguments->executor, "auto, cuda or host")->capture_default_str();
+  verb->add_flag("--sample", arguments->sample, "study scale: a digest and a sample of the fields");
+  verb->add_flag("--quiet", arguments->quiet, "no output");
+  verb->callback([arguments, &exit_status] { exit_status = record(*arguments); });
+}
+
+}  // namespace decant
