@@ -42,6 +42,8 @@ class Hdf5Reader {
   /// [n,3] dataset of reals as 3×n.
   Eigen::Matrix3Xd matrix3(const std::string& path, std::int64_t n = -1) const;
   /// [n] dataset of integers of any width; one beyond int64 is refused.
+  /// One entry of a [T,n,3] dataset as 3×n.
+  Eigen::Matrix3Xd matrix3_at(const std::string& path, std::int64_t index) const;
   IdVector integers(const std::string& path, std::int64_t n = -1) const;
   /// [n] dataset of strings.
   std::vector<std::string> strings(const std::string& path, std::int64_t n = -1) const;

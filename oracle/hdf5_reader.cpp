@@ -131,7 +131,8 @@ void check_storage(const Hdf5Reader& reader, const std::string& path, const Data
                 "chunks no larger than the dataset");
 }
 
-/// Opens a dataset and holds it to class, rank, first extent (n >= 0) and a second extent of 3.
+/// Opens a dataset and holds it to class, rank, first extent (n >= 0) and, beyond rank 1, a last
+/// extent of 3.
 Dataset open_dataset(const Hdf5Reader& reader, hid_t file, const std::string& path,
                      H5T_class_t kind, std::size_t rank, std::int64_t n) {
   Handle object = open_object(reader, file, path);
@@ -146,13 +147,14 @@ Dataset open_dataset(const Hdf5Reader& reader, hid_t file, const std::string& pa
                     data.dims.size() == rank &&
                     H5Sget_simple_extent_type(data.space.get()) != H5S_NULL &&
                     (rank < 1 || n < 0 || data.dims[0] == static_cast<hsize_t>(n)) &&
-                    (rank < 2 || data.dims[1] == 3);
+                    (rank < 2 || data.dims.back() == 3);
   if (!fits) {
     const std::string first = n < 0 ? "N" : std::to_string(n);
     reader.fail(path, describe(data.type.get(), data.dims),
                 kind_name(kind) + (rank == 0   ? " scalar"
                                    : rank == 1 ? fmt::format(" [{}]", first)
-                                               : fmt::format(" [{},3]", first)));
+                                   : rank == 2 ? fmt::format(" [{},3]", first)
+                                               : fmt::format(" [{},N,3]", first)));
   }
   check_storage(reader, path, data);
   for (const hsize_t extent : data.dims) data.count *= static_cast<std::size_t>(extent);
@@ -264,6 +266,21 @@ Eigen::Matrix3Xd Hdf5Reader::matrix3(const std::string& path, std::int64_t n) co
   const Dataset data = open_dataset(*this, id_, path, H5T_FLOAT, 2, n);
   Eigen::Matrix3Xd values(3, static_cast<Eigen::Index>(data.dims[0]));
   read_all(*this, path, data, H5T_NATIVE_DOUBLE, values.data());
+  return values;
+}
+
+Eigen::Matrix3Xd Hdf5Reader::matrix3_at(const std::string& path, std::int64_t index) const {
+  const Dataset data = open_dataset(*this, id_, path, H5T_FLOAT, 3, -1);
+  if (index < 0 || static_cast<hsize_t>(index) >= data.dims[0])
+    fail(path, describe(data.type.get(), data.dims), fmt::format("to hold entry {}", index));
+  Eigen::Matrix3Xd values(3, static_cast<Eigen::Index>(data.dims[1]));
+  const hsize_t start[3] = {static_cast<hsize_t>(index), 0, 0};
+  const hsize_t count[3] = {1, data.dims[1], 3};
+  const Handle memory(H5Screate_simple(3, count, nullptr));
+  H5Sselect_hyperslab(data.space.get(), H5S_SELECT_SET, start, nullptr, count, nullptr);
+  if (values.size() > 0 && H5Dread(data.id.get(), H5T_NATIVE_DOUBLE, memory.get(),
+                                   data.space.get(), H5P_DEFAULT, values.data()) < 0)
+    fail(path, hdf5_message(), "readable; the file is damaged");
   return values;
 }
 

@@ -24,7 +24,7 @@ std::vector<std::string> phase_names();
 ///   start 0 · settled t0 · tilt-onset t0 + 0.25 (t1 − t0) · stream t0 + 0.57 (t1 − t0) ·
 ///   splash t0 + 0.65 (t1 − t0) · filling t0 + 0.85 (t1 − t0) · rest T
 ///
-/// The smoothstep has then done 16 %, 43 %, 57 % and 84 % of the turn: in the standard pour the
+/// The smoothstep has then done 16 %, 60 %, 72 % and 94 % of the turn: in the standard pour the
 /// water has left its level, runs as a stream, has just met the receiver's bottom, and fills it.
 /// Throws InputError for an unknown name, or where a phase needs a tilt that the scene lacks.
 double phase_time(const Scene& scene, const std::string& name);

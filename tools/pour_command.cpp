@@ -21,7 +21,7 @@ namespace decant {
 namespace {
 
 struct PourArguments {
-  std::string scene, out, backend = "hash", executor = "auto";
+  std::string scene, out, backend = "reference", executor = "auto";
   std::optional<std::int64_t> particles, frames;
   bool csv = false, resume = false, quiet = false, json = false;
 };

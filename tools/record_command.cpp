@@ -16,6 +16,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -47,16 +48,45 @@ struct Start {
   std::string origin;  // for the provenance
 };
 
+/// The last frame of a finished pour at or before the first phase asked for.
+ParticleState state_in_frames(const Hdf5Reader& frames, const Scene& scene,
+                              const std::vector<std::string>& phases) {
+  const std::string file = frames.file().string();
+  const std::string sha256 = sha256_of_text(scene_to_json(scene));
+  if (frames.text_attribute("/", "scene_sha256") != sha256)
+    throw InputError(file, "scene_sha256", frames.text_attribute("/", "scene_sha256"),
+                     sha256 + ", that of the scene given (frames of the same number, too)");
+  std::int64_t target = std::numeric_limits<std::int64_t>::max();
+  for (const auto& text : phases) target = std::min(target, parse_phase(scene, text).substep);
+  const std::int64_t per_frame = scene.schedule.substeps_per_frame;
+  const std::int64_t last = frames.shape("/time").at(0) - 1;
+  const std::int64_t frame = std::min(target / per_frame, last);
+  ParticleState state;
+  state.substep = frame * per_frame;
+  state.position = frames.matrix3_at("/fluid/position", frame);
+  state.velocity = frames.matrix3_at("/fluid/velocity", frame);
+  if (!state.position.allFinite() || !state.velocity.allFinite())
+    throw InputError(file, fmt::format("frame {}", frame), "not finite", "a frame that was written");
+  return state;
+}
+
 Start start_of(const RecordArguments& arguments, const Scene& scene) {
   if (arguments.from.empty()) return {initial_state(scene), {}, "the scene's initial state"};
   const std::string& file = arguments.from;
+  const Hdf5Reader reader(file);
+  if (reader.has("/fluid/position")) {
+    const auto name = [&](const char* attribute) { return reader.text_attribute("/", attribute); };
+    return {state_in_frames(reader, scene, arguments.phases), {},
+            fmt::format("a frame of {} on {} ({}, {})", name("backend"), name("device"),
+                        name("executor"), name("precision"))};
+  }
   const auto take = [&](ParticleState state, const std::string& scene_json, std::string phase) {
     if (scene_json != scene_to_json(scene))
       throw InputError(file, "scene", "another scene", "the scene of " + arguments.scene);
     return Start{std::move(state), std::move(phase),
                  std::filesystem::path(file).filename().string() + " " + sha256_of_file(file)};
   };
-  if (Hdf5Reader(file).has_attribute("/", "decant_fixture")) {
+  if (reader.has_attribute("/", "decant_fixture")) {
     Fixture fixture = read_fixture(file);
     return take(std::move(fixture.state), scene_to_json(fixture.scene), fixture.phase);
   }
@@ -179,7 +209,7 @@ void add_record_command(CLI::App& app, int& exit_status) {
       ->required();
   verb->add_option("--phase", arguments->phases, "NAME or NAME=TIME (s); may be repeated")
       ->allow_extra_args(false);
-  verb->add_option("--from", arguments->from, "start from a checkpoint.h5 or a fixture");
+  verb->add_option("--from", arguments->from, "start from a frames.h5, a checkpoint.h5 or a fixture");
   verb->add_option("--backend", arguments->backend, "what moves the fluid: reference, brute, …")
       ->capture_default_str();
   verb->add_option("--executor", arguments->executor, "auto, cuda or host")->capture_default_str();
