@@ -1,19 +1,26 @@
 /// \file
 /// One substep of the oracle with the tolerance of every position and velocity. Contact is a
-/// discontinuity: particles whose contact, or whose nearest face, fp32 cannot decide are named and
-/// counted instead of widening the tolerance for all.
+/// discontinuity: where fp32 cannot decide whether a particle touches, a backend may answer either
+/// way, and each answer has its own narrow tolerance; nothing is widened.
 #pragma once
 
 #include "oracle/tolerance.hpp"
 
 namespace decant {
 
+/// What a particle may be after the substep, and how precisely.
+struct SubstepOutcome {
+  Vec3 position, velocity;                      // m, m/s
+  Vec3 position_tolerance, velocity_tolerance;  // m, m/s
+};
+
 struct SubstepAnswer {
-  ParticleState state;                   // after the substep
-  Eigen::Matrix3Xd position_tolerance;   // 3×N, m
-  Eigen::Matrix3Xd velocity_tolerance;   // 3×N, m/s
-  std::vector<bool> ambiguous;           // N
-  std::int64_t most_ambiguous = 0;       // 2 % of the particles, and ten
+  /// Per particle the oracle's own outcome, then those with its undecidable contacts decided
+  /// otherwise.
+  std::vector<std::vector<SubstepOutcome>> outcomes;
+  /// Particles left out: the nearest face cannot be told, or more than three contacts are open.
+  std::vector<bool> ambiguous;      // N
+  std::int64_t most_ambiguous = 0;  // 2 % of the particles, and ten
 };
 
 /// tau_v = dt tau_a + 2u(|v| + dt|a|), tau_x = dt tau_v + 2u(|x| + dt|v|), and at every contact

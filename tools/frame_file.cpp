@@ -81,7 +81,7 @@ std::vector<DatasetPlan> plan(const FrameLayout& layout) {
   fail(file, fmt::format("{}: {}", what, std::generic_category().message(errno)));
 }
 
-/// UTF-8 of `size` bytes, or variable-length.
+/// UTF-8 of `size` bytes.
 Handle text_type(std::size_t size) {
   Handle type(H5Tcopy(H5T_C_S1));
   H5Tset_size(type.get(), size);
@@ -90,11 +90,10 @@ Handle text_type(std::size_t size) {
 }
 
 void put_text(hid_t object, const std::string& name, const std::string& text) {
-  const Handle type = text_type(H5T_VARIABLE), space(H5Screate(H5S_SCALAR));
+  const Handle type = text_type(text.size() + 1), space(H5Screate(H5S_SCALAR));
   const Handle attribute(
       H5Acreate2(object, name.c_str(), type.get(), space.get(), H5P_DEFAULT, H5P_DEFAULT));
-  const char* pointer = text.c_str();
-  if (!attribute || H5Awrite(attribute.get(), type.get(), &pointer) < 0)
+  if (!attribute || H5Awrite(attribute.get(), type.get(), text.c_str()) < 0)
     throw std::runtime_error("attribute " + name + ": " + hdf5_message());
 }
 
