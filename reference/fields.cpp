@@ -1,5 +1,6 @@
 /// \file
-/// Density, pressure and acceleration of every particle, term by term as pair_terms.hpp states them.
+/// Density, pressure and acceleration of every particle, term by term as pair_terms.hpp states
+/// them.
 #include "reference/kernel.hpp"
 #include "reference/pair_terms.hpp"
 #include "reference/pose.hpp"
@@ -77,8 +78,12 @@ void evaluate(const Scene& scene, const ParticleState& state, const PosedWalls& 
   const Matrix x_wall = walls.position.cast<Real>(), v_wall = walls.velocity.cast<Real>();
   using Column = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
   const Column V = volumes.cast<Real>();
-  const auto fluid_of = [&](Eigen::Index i) -> const auto& { return neighbors.fluid[static_cast<std::size_t>(i)]; };
-  const auto wall_of = [&](Eigen::Index i) -> const auto& { return neighbors.wall[static_cast<std::size_t>(i)]; };
+  const auto fluid_of = [&](Eigen::Index i) -> const auto& {
+    return neighbors.fluid[static_cast<std::size_t>(i)];
+  };
+  const auto wall_of = [&](Eigen::Index i) -> const auto& {
+    return neighbors.wall[static_cast<std::size_t>(i)];
+  };
 
   out = Fields::unwritten(n, walls.position.cols());
   out.boundary_volume = volumes;
@@ -89,8 +94,7 @@ void evaluate(const Scene& scene, const ParticleState& state, const PosedWalls& 
     for (const auto j : fluid_of(i))
       sum += density_term(m, kernel.W(separation(x_i, Vector(x.col(j))).norm()));
     for (const auto b : wall_of(i))
-      sum += wall_density_term(rho0, V[b],
-                               kernel.W(separation(x_i, Vector(x_wall.col(b))).norm()));
+      sum += wall_density_term(rho0, V[b], kernel.W(separation(x_i, Vector(x_wall.col(b))).norm()));
     rho[i] = sum;
     out.density[i] = static_cast<double>(sum);
     if (given && given->density.size()) rho[i] = static_cast<Real>(given->density[i]);
@@ -117,7 +121,8 @@ void evaluate(const Scene& scene, const ParticleState& state, const PosedWalls& 
       const Vector x_ib = separation(x_i, Vector(x_wall.col(b)));
       const Real r = x_ib.norm();
       wall_pressure += wall_pressure_term(rho0, V[b], q[i], kernel.G(r), x_ib);
-      wall_viscous += wall_viscous_term(mu_w, V[b], rho[i], v_i, Vector(v_wall.col(b)), kernel.L(r));
+      wall_viscous +=
+          wall_viscous_term(mu_w, V[b], rho[i], v_i, Vector(v_wall.col(b)), kernel.L(r));
     }
     out.pressure_acceleration.col(i) = pressure.template cast<double>();
     out.viscous_acceleration.col(i) = viscous.template cast<double>();

@@ -19,7 +19,8 @@ void search_all_pairs(const Scene& scene, const Eigen::Matrix3Xd& fluid,
                       const Eigen::Matrix3Xd& wall, Neighbors& out) {
   const Separation separation(scene.domain);
   const double squared_support = scene.support_radius() * scene.support_radius();
-  const auto n = static_cast<std::int32_t>(fluid.cols()), m = static_cast<std::int32_t>(wall.cols());
+  const auto n = static_cast<std::int32_t>(fluid.cols()),
+             m = static_cast<std::int32_t>(wall.cols());
   for (std::int32_t j = 0; j < n; ++j) {
     const Vec3 x_j = fluid.col(j);
     for (std::int32_t i = j + 1; i < n; ++i)
@@ -39,7 +40,9 @@ void search_all_pairs(const Scene& scene, const Eigen::Matrix3Xd& fluid,
 /// Fluid particles sorted by cell, cells at least H wide.
 class CellList {
  public:
-  CellList(const Scene& scene, const Eigen::Matrix3Xd& x) {
+  CellList(const Scene& scene, const Eigen::Matrix3Xd& x)
+      : separation_(scene.domain),
+        squared_support_(scene.support_radius() * scene.support_radius()) {
     const Domain& domain = scene.domain;
     periodic_ = domain.periodic;
     Vec3 high;
@@ -50,7 +53,7 @@ class CellList {
     // A lone outlier must not cost memory: cells grow until there are few for each particle.
     // The margin keeps a rounded cell index from hiding a pair just inside H.
     double width = scene.support_radius() * (1 + 1e-9);
-    const double most = 8.0 * static_cast<double>(x.cols()) + 64;
+    const double most = 32.0 * static_cast<double>(x.cols()) + 4096;
     for (;; width *= 1.5) {
       double cells = 1;
       for (int a = 0; a < 3; ++a) cells *= std::floor((high[a] - low_[a]) / width) + 1;
@@ -76,7 +79,7 @@ class CellList {
     for (std::size_t c = 0; c < cells; ++c) start_[c + 1] += start_[c];
     id_.resize(cell_of.size());
     position_.resize(3, x.cols());
-    std::vector<std::size_t> next(start_.begin(), start_.end() - 1);
+    std::vector<std::uint32_t> next(start_.begin(), start_.end() - 1);
     for (std::size_t i = 0; i < cell_of.size(); ++i) {
       const std::size_t k = next[cell_of[i]]++;
       id_[k] = static_cast<std::int32_t>(i);
@@ -84,9 +87,9 @@ class CellList {
     }
   }
 
-  /// visit(i, x_i) for every particle in the cells that a point's support can reach.
-  template <class Visit>
-  void near(const Vec3& x, Visit&& visit) const {
+  /// Ids of the particles within H of a point, in no order.
+  void within(const Vec3& x, std::vector<std::int32_t>& found) const {
+    found.clear();
     std::array<int, 3> c, first, last;
     for (int a = 0; a < 3; ++a) {
       c[a] = cell_along(x, a, -2, count_[a] + 1);
@@ -94,16 +97,34 @@ class CellList {
       first[a] = around ? c[a] - 1 : std::max(c[a] - 1, 0);
       last[a] = around ? c[a] + 1 : std::min(c[a] + 1, count_[a] - 1);
     }
+    const bool one_run = first[0] >= 0 && last[0] < count_[0];
     for (int z = first[2]; z <= last[2]; ++z)
-      for (int y = first[1]; y <= last[1]; ++y)
-        for (int along = first[0]; along <= last[0]; ++along) {
-          const std::size_t cell = index(wrapped(along, 0), wrapped(y, 1), wrapped(z, 2));
-          for (std::size_t k = start_[cell]; k < start_[cell + 1]; ++k)
-            visit(id_[k], Vec3(position_.col(static_cast<Eigen::Index>(k))));
+      for (int y = first[1]; y <= last[1]; ++y) {
+        const std::size_t row = index(0, wrapped(y, 1), wrapped(z, 2));
+        if (one_run) {
+          if (first[0] <= last[0]) add_run(row + first[0], row + last[0], x, found);
+        } else {
+          for (int along = first[0]; along <= last[0]; ++along)
+            add_run(row + wrapped(along, 0), row + wrapped(along, 0), x, found);
         }
+      }
   }
 
  private:
+  /// Cells that follow each other along x hold their particles without a gap.
+  void add_run(std::size_t first_cell, std::size_t last_cell, const Vec3& x,
+               std::vector<std::int32_t>& found) const {
+    const std::size_t begin = start_[first_cell], end = start_[last_cell + 1];
+    std::size_t n = found.size();
+    found.resize(n + (end - begin));
+    // No branch on what no processor can predict.
+    for (std::size_t k = begin; k < end; ++k) {
+      found[n] = id_[k];
+      const Vec3 x_k = position_.col(static_cast<Eigen::Index>(k));
+      n += separation_(x_k, x).squaredNorm() < squared_support_;
+    }
+    found.resize(n);
+  }
   /// Cell index along one axis: wrapped where the axis is periodic, else clamped to least … most.
   int cell_along(const Vec3& x, int a, int least, int most) const {
     const double c = std::floor((x[a] - low_[a]) * inverse_width_[a]);
@@ -115,30 +136,28 @@ class CellList {
     return (static_cast<std::size_t>(z) * count_[1] + y) * count_[0] + x;
   }
 
+  Separation separation_;
+  double squared_support_;
   Vec3 low_, inverse_width_;
   std::array<int, 3> count_;
   std::array<bool, 3> periodic_;
-  std::vector<std::size_t> start_;
+  std::vector<std::uint32_t> start_;
   std::vector<std::int32_t> id_;
   Eigen::Matrix3Xd position_;
 };
 
 void search_cells(const Scene& scene, const Eigen::Matrix3Xd& fluid, const Eigen::Matrix3Xd& wall,
                   Neighbors& out) {
-  const Separation separation(scene.domain);
-  const double squared_support = scene.support_radius() * scene.support_radius();
   const CellList cells(scene, fluid);
+  std::vector<std::int32_t> near;
   for (std::int32_t j = 0; j < fluid.cols(); ++j) {
-    const Vec3 x_j = fluid.col(j);
-    cells.near(x_j, [&](std::int32_t i, const Vec3& x_i) {
-      if (i != j && separation(x_i, x_j).squaredNorm() < squared_support) out.fluid[i].push_back(j);
-    });
+    cells.within(fluid.col(j), near);
+    for (const auto i : near)
+      if (i != j) out.fluid[i].push_back(j);
   }
   for (std::int32_t b = 0; b < wall.cols(); ++b) {
-    const Vec3 x_b = wall.col(b);
-    cells.near(x_b, [&](std::int32_t i, const Vec3& x_i) {
-      if (separation(x_i, x_b).squaredNorm() < squared_support) out.wall[i].push_back(b);
-    });
+    cells.within(wall.col(b), near);
+    for (const auto i : near) out.wall[i].push_back(b);
   }
 }
 
