@@ -62,6 +62,19 @@ TEST_F(DamagedFixture, DamageAnywhereInTheFileNeverCrashes) {
   }
 }
 
+/// Deflated bytes that are whole in themselves, but shorter than a chunk.
+TEST_F(DamagedFixture, AChunkThatInflatesToLessThanItIsIsRefused) {
+  edit([](hid_t file) {
+    const hid_t data = H5Dopen2(file, "/oracle/density", H5P_DEFAULT);
+    const unsigned char eight_zeros[] = {0x78, 0x9c, 0x63, 0x60, 0x80, 0x01, 0x00, 0x00, 0x08,
+                                         0x00, 0x01};
+    const hsize_t start = 0;
+    H5Dwrite_chunk(data, H5P_DEFAULT, 0, &start, sizeof eight_zeros, eight_zeros);
+    H5Dclose(data);
+  });
+  expect_refused("/oracle/density", "chunk 0 of 1", "whole");
+}
+
 TEST_F(DamagedFixture, AnotherSchemaVersionIsRefused) {
   set_attribute("/", "decant_fixture", H5T_NATIVE_INT64, std::int64_t{2});
   expect_refused("/@decant_fixture", "2", "1");
