@@ -172,7 +172,8 @@ std::unique_ptr<Backend> make_backend(std::string_view name, Executor executor,
   for (const Entry& entry : table) {
     if (name != entry.name) continue;
     if (!options.empty())
-      throw InputError("--backend", std::string(name), options, "this backend takes no options");
+      throw InputError("command line", "--backend", entry.name + (":" + options),
+                       std::string(entry.name) + " takes no options");
     std::string why_not;
     if (!executor_available(executor, &why_not))
       throw BackendError("executor cuda: " + why_not);
@@ -181,7 +182,7 @@ std::unique_ptr<Backend> make_backend(std::string_view name, Executor executor,
   }
   std::string known;
   for (const Entry& entry : table) known += (known.empty() ? "" : ", ") + std::string(entry.name);
-  throw InputError("--backend", "name", std::string(name), "known: reference, " + known);
+  throw InputError("command line", "--backend", std::string(name), "one of " + known);
 }
 
 }  // namespace decant

@@ -13,16 +13,23 @@ namespace {
 
 class ReferenceBackend : public Backend {
  public:
-  BackendInfo info() const override { return {"reference", "", "reference", "1 CPU core", "fp64"}; }
+  explicit ReferenceBackend(NeighborSearch search) : search_(search) {}
+
+  BackendInfo info() const override {
+    return {"reference", search_ == NeighborSearch::all_pairs ? "all-pairs" : "", "reference",
+            "1 CPU core", "fp64"};
+  }
 
   void load(const Scene& scene, const Walls& walls, const ParticleState& state) override {
     scene_ = scene;
-    solver_.emplace(scene, walls, state);
+    solver_.emplace(scene, walls, state, search_);
   }
 
   Status evaluate(Fields& out, const StageInputs* given) override {
+    // Cells cannot be found for a position that is no number.
+    if (const Status status = check(); !status.ok()) return status;
     solver().fields(out, given);
-    return check();
+    return {};
   }
 
   Status advance(int substeps) override {
@@ -66,13 +73,16 @@ class ReferenceBackend : public Backend {
     return {};
   }
 
+  NeighborSearch search_;
   Scene scene_;
   std::optional<Solver> solver_;
 };
 
 }  // namespace
 
-std::unique_ptr<Backend> make_reference_backend() { return std::make_unique<ReferenceBackend>(); }
+std::unique_ptr<Backend> make_reference_backend(NeighborSearch search) {
+  return std::make_unique<ReferenceBackend>(search);
+}
 
 std::string describe(const Status& status) {
   if (status.ok()) return "ok";

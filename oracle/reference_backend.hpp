@@ -4,11 +4,13 @@
 
 #include "oracle/backend.hpp"
 
+#include "reference/neighbors.hpp"
+
 #include <memory>
 
 namespace decant {
 
-/// Double precision, neighbors by cells.
-std::unique_ptr<Backend> make_reference_backend();
+/// Double precision; either search gives the same bits.
+std::unique_ptr<Backend> make_reference_backend(NeighborSearch search = NeighborSearch::cells);
 
 }  // namespace decant

@@ -35,14 +35,20 @@ std::vector<std::string> backend_choices() {
   return names;
 }
 
-std::unique_ptr<Backend> choose_backend(const std::string& name, const std::string& executor) {
+std::unique_ptr<Backend> choose_backend(const std::string& choice, const std::string& executor) {
+  const auto colon = choice.find(':');
+  const std::string name = choice.substr(0, colon);
+  const std::string options = colon == std::string::npos ? "" : choice.substr(colon + 1);
   const auto choices = backend_choices();
   if (std::find(choices.begin(), choices.end(), name) == choices.end())
     refuse("--backend", name, fmt::format("must be one of {}", fmt::join(choices, ", ")));
-  if (name != "reference") return make_backend(name, executor_of(executor));
+  if (name != "reference") return make_backend(name, executor_of(executor), options);
   if (executor == "cuda") refuse("--executor", executor, "the reference runs on the host only");
   if (executor != "auto" && executor != "host") (void)executor_of(executor);
-  return make_reference_backend();
+  if (!options.empty() && options != "all-pairs")
+    refuse("--backend", choice, "reference or reference:all-pairs");
+  return make_reference_backend(options.empty() ? NeighborSearch::cells
+                                                : NeighborSearch::all_pairs);
 }
 
 }  // namespace decant

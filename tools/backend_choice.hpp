@@ -20,9 +20,10 @@ class DeviceAbsent : public BackendError {
 /// What --backend accepts: "reference" and the table of backends under test.
 std::vector<std::string> backend_choices();
 
-/// The backend of that name. \param executor  "auto" (cuda where there is a device, else host),
+/// The backend of that choice, NAME or NAME:OPTIONS ("reference:all-pairs").
+/// \param executor  "auto" (cuda where there is a device, else host),
 /// "cuda" or "host"; the reference runs on the host only
 /// Throws InputError for an unknown name, DeviceAbsent where the executor has no device.
-std::unique_ptr<Backend> choose_backend(const std::string& name, const std::string& executor);
+std::unique_ptr<Backend> choose_backend(const std::string& choice, const std::string& executor);
 
 }  // namespace decant

@@ -26,6 +26,9 @@ void add_info_command(CLI::App& app, int& exit_status);
 /// `decant conform`: the conformance suite.
 void add_conform_command(CLI::App& app, int& exit_status);
 
+/// `decant bench`: what a substep costs.
+void add_bench_command(CLI::App& app, int& exit_status);
+
 /// `decant record`: runs the oracle and writes a fixture.
 void add_record_command(CLI::App& app, int& exit_status);
 

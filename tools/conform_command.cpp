@@ -37,7 +37,7 @@ constexpr const char* footer =
     "77 the device of --executor is absent.\n"
     "\n"
     "Example:\n"
-    "  decant conform --backend hash,list --report build/conform.h5";
+    "  decant conform --backend brute --report build/conform.h5";
 
 /// A backend that was asked for, or why it is not there.
 struct Candidate {
@@ -213,7 +213,7 @@ void add_conform_command(CLI::App& app, int& exit_status) {
   verb->footer(footer);
   verb->add_option("FIXTURE", arguments->fixtures, "recordings (*.h5); default: the small ones");
   verb->add_flag("--all", arguments->all, "the study-scale recordings too");
-  verb->add_option("--backend", arguments->backends, "brute,hash,…; default: all under test")
+  verb->add_option("--backend", arguments->backends, "brute,…; default: all under test")
       ->delimiter(',')
       ->allow_extra_args(false);
   verb->add_option("--executor", arguments->executor, "auto, cuda or host")->capture_default_str();

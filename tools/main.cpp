@@ -17,7 +17,7 @@ namespace {
 constexpr const char* footer =
     "Examples:\n"
     "  decant pour fixtures/scenes/pour-4k.json --out build/pour-4k\n"
-    "  decant conform --backend brute,hash,list\n"
+    "  decant conform --backend brute --report build/report.h5\n"
     "  decant record fixtures/scenes/pour-4k.json --out pour-4k-stream.h5\n"
     "  decant info\n"
     "\n"
@@ -41,6 +41,7 @@ int main(int argc, char** argv) {
   add_pour_command(app, status);
   add_record_command(app, status);
   add_conform_command(app, status);
+  add_bench_command(app, status);
   add_info_command(app, status);
   try {
     app.parse(argc, argv);
