@@ -154,9 +154,9 @@ class Bounds {
       const double rho = rho_given ? given_->density[i] : answer_.fields.density[i];
       const double tau_rho = rho_given ? 0.0 : answer_.tolerance.density[i];
       const double compression = rho / rho0;
-      double tau_p = c0 * c0 * std::pow(compression, gamma - 1) * tau_rho +
-                     20 * u * B * std::pow(compression, gamma);
       const double unclamped = B * (std::pow(compression, gamma) - 1);
+      double tau_p = c0 * c0 * std::pow(compression, gamma - 1) * tau_rho +
+                     20 * u * B * std::pow(compression, gamma) + 3 * u * std::max(-unclamped, 0.0);
       if (!scene_.fluid.allow_tension && unclamped + tau_p < 0) tau_p = 0;
       answer_.tolerance.pressure[i] = tau_p;
       const bool p_given = given_ && given_->pressure.size();

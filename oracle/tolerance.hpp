@@ -37,7 +37,9 @@ struct OracleAnswer {
 ///
 ///   tau(V_b) = V_b² (√n + 6) u Σ (W + r|W'|) + 2 u V_b
 ///   tau_rho = (√n + 6) u [C + Σ rho0 V_b |W'| X_b] + Σ rho0 tau(V_b) W
-///   tau_p = c0² (rho/rho0)^(gamma−1) tau_rho + 20 u B (rho/rho0)^gamma, 0 where p is certainly clamped
+///   tau_p = c0² (rho/rho0)^(gamma−1) tau_rho + 20 u B (rho/rho0)^gamma + 3 u max(−p, 0), 0 where p
+///           is certainly clamped; the last term, B, difference and product, is that of tension in
+///           thin fluid, where the power vanishes and −B stays
 ///   tau_q = tau_p/rho² + 2 p tau_rho/rho³ + 3 u p/rho²
 ///   tau_a,c = (√n + 8) u [Σ |t|(1 + κ) + pose] + √Σ (m tau_q,j G x_c)² + 2 tau_q,i |Σ m G x_c +
 ///             Σ rho0 V_b G x_c| + Σ (tau_rho,i/rho_i + tau_rho,j/rho_j)|t_visc| + Σ tau(V_b)/V_b |t|

@@ -1,0 +1,187 @@
+/// \file
+/// What every backend promises beyond right numbers: states come back as they went in, work can be
+/// split anywhere, trouble is reported and named, and scenes with next to nothing in them run.
+#include "tests/random_scene.hpp"
+
+#include "gpu/backends.hpp"
+#include "oracle/reference_backend.hpp"
+#include "reference/error.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace decant {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+struct Choice {
+  std::string name;
+  Executor executor;
+};
+
+std::vector<Choice> choices() {
+  std::vector<Choice> all = {{"reference", Executor::host}};
+  for (const auto& name : backend_names())
+    for (const auto executor : {Executor::host, Executor::cuda}) all.push_back({name, executor});
+  return all;
+}
+
+class BackendContract : public testing::TestWithParam<Choice> {
+ protected:
+  void SetUp() override {
+    std::string why_not;
+    if (!executor_available(GetParam().executor, &why_not)) GTEST_SKIP() << why_not;
+    backend_ = GetParam().name == "reference" ? make_reference_backend()
+                                              : make_backend(GetParam().name, GetParam().executor);
+  }
+
+  void load(const Fixture& f) { backend_->load(f.scene, sample_walls(f.scene), f.state); }
+  ParticleState state() const {
+    ParticleState s;
+    backend_->read(s);
+    return s;
+  }
+  static void expect_equal(const ParticleState& a, const ParticleState& b) {
+    EXPECT_EQ(a.substep, b.substep);
+    EXPECT_TRUE(a.position == b.position);
+    EXPECT_TRUE(a.velocity == b.velocity);
+  }
+  /// A few particles in the open, in the middle of the domain.
+  static Fixture drops(std::initializer_list<Vec3> positions) {
+    Fixture f = test::random_fixture(3);
+    f.scene.containers.clear();
+    f.scene.domain = {Vec3(-1, -1, -1), Vec3(1, 1, 1), {}};
+    f.state.position.resize(3, static_cast<Eigen::Index>(positions.size()));
+    Eigen::Index i = 0;
+    for (const Vec3& x : positions) f.state.position.col(i++) = x;
+    f.state.velocity.setZero(3, i);
+    f.state.quantise();
+    return f;
+  }
+
+  std::unique_ptr<Backend> backend_;
+};
+
+TEST_P(BackendContract, AStateComesBackAsItWentIn) {
+  Fixture f = test::random_fixture(1);
+  f.state.substep = 1234;
+  load(f);
+  expect_equal(state(), f.state);
+}
+
+TEST_P(BackendContract, EvaluatingLeavesTheStateAlone) {
+  const Fixture f = test::random_fixture(2);
+  load(f);
+  Fields out = Fields::unwritten(f.state.size(), sample_walls(f.scene).size());
+  ASSERT_TRUE(backend_->evaluate(out).ok());
+  expect_equal(state(), f.state);
+}
+
+TEST_P(BackendContract, TwoStretchesAreOneLongOne) {
+  const Fixture f = test::random_fixture(4);
+  load(f);
+  ASSERT_TRUE(backend_->advance(7).ok());
+  const ParticleState whole = state();
+  load(f);
+  ASSERT_TRUE(backend_->advance(3).ok());
+  ASSERT_TRUE(backend_->advance(4).ok());
+  expect_equal(state(), whole);
+  EXPECT_EQ(whole.substep, f.state.substep + 7);
+  EXPECT_FALSE(whole.position == f.state.position);
+}
+
+TEST_P(BackendContract, NoSubstepChangesNothing) {
+  const Fixture f = test::random_fixture(5);
+  load(f);
+  ASSERT_TRUE(backend_->advance(0).ok());
+  expect_equal(state(), f.state);
+}
+
+TEST_P(BackendContract, ALaterLoadForgetsTheFirst) {
+  const Fixture large = test::random_fixture(6), small = drops({Vec3(0.1, 0.2, 0.3)});
+  load(small);
+  ASSERT_TRUE(backend_->advance(2).ok());
+  const ParticleState alone = state();
+  load(large);
+  ASSERT_TRUE(backend_->advance(2).ok());
+  load(small);
+  ASSERT_TRUE(backend_->advance(2).ok());
+  expect_equal(state(), alone);
+}
+
+TEST_P(BackendContract, NothingLoadedIsAnError) {
+  Fields out;
+  EXPECT_THROW((void)backend_->evaluate(out), BackendError);
+  EXPECT_THROW((void)backend_->advance(1), BackendError);
+}
+
+TEST_P(BackendContract, AnEmptySceneRuns) {
+  Fixture f = drops({});
+  load(f);
+  Fields out = Fields::unwritten(0, 0);
+  EXPECT_TRUE(backend_->evaluate(out).ok());
+  EXPECT_TRUE(backend_->advance(3).ok());
+  EXPECT_EQ(state().size(), 0);
+}
+
+TEST_P(BackendContract, OneParticleFalls) {
+  const Fixture f = drops({Vec3(0.1, 0.2, 0.3)});
+  load(f);
+  ASSERT_TRUE(backend_->advance(10).ok());
+  const double dt = f.scene.time_step();
+  EXPECT_NEAR(state().velocity(2, 0), -9.81 * 10 * dt, 1e-6 * 9.81 * 10 * dt);
+  EXPECT_NEAR(state().position(2, 0), 0.3 - 9.81 * dt * dt * 55, 1e-6);
+}
+
+TEST_P(BackendContract, TwoParticlesInOnePlaceStayFinite) {
+  const Fixture f = drops({Vec3(0.1, 0.2, 0.3), Vec3(0.1, 0.2, 0.3)});
+  load(f);
+  Fields out = Fields::unwritten(2, 0);
+  ASSERT_TRUE(backend_->evaluate(out).ok());
+  EXPECT_TRUE(out.acceleration.allFinite());
+  EXPECT_EQ(out.fluid_neighbor_count[0], 1);
+  EXPECT_TRUE(backend_->advance(1).ok());
+}
+
+TEST_P(BackendContract, AVelocityThatIsNoNumberIsReportedWithItsParticle) {
+  Fixture f = test::random_fixture(8);
+  f.state.velocity(1, 5) = nan;
+  load(f);
+  const Status status = backend_->advance(1);
+  EXPECT_TRUE(status.bits & Status::non_finite) << describe(status);
+  EXPECT_GE(status.particle, 0);
+  EXPECT_EQ(status.substep, f.state.substep + 1);
+}
+
+TEST_P(BackendContract, APositionThatIsNoNumberIsReported) {
+  Fixture f = drops({Vec3(0.1, 0.2, 0.3), Vec3(0.5, 0.2, 0.3)});
+  f.state.position(0, 1) = nan;
+  load(f);
+  Fields out = Fields::unwritten(2, 0);
+  const Status status = backend_->evaluate(out);
+  EXPECT_TRUE(status.bits & Status::non_finite) << describe(status);
+  EXPECT_EQ(status.particle, 1);
+}
+
+TEST_P(BackendContract, AParticleThatLeavesTheDomainIsReportedWhenItDoes) {
+  Fixture f = drops({Vec3(0.1, 0.2, 0.3), Vec3(0.999, 0.2, 0.3)});
+  const double dt = f.scene.time_step();
+  f.state.velocity(0, 1) = 0.001 / (4.5 * dt);
+  load(f);
+  ASSERT_TRUE(backend_->advance(4).ok());
+  const Status status = backend_->advance(3);
+  EXPECT_TRUE(status.bits & Status::escaped) << describe(status);
+  EXPECT_EQ(status.particle, 1);
+  EXPECT_EQ(status.substep, f.state.substep + 5);
+}
+
+INSTANTIATE_TEST_SUITE_P(Backends, BackendContract, testing::ValuesIn(choices()),
+                         [](const auto& chosen) {
+                           return chosen.param.name +
+                                  (chosen.param.executor == Executor::host ? "Host" : "Cuda");
+                         });
+
+}  // namespace
+}  // namespace decant

@@ -1,0 +1,212 @@
+/// \file
+/// The suite is worth what it catches: every fault of a catalogue must fail the check that is there
+/// for it, and the solver without a fault must pass every check.
+#include "oracle/conform.hpp"
+#include "tests/edited_reference.hpp"
+
+#include "reference/kernel.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <ostream>
+
+namespace decant {
+namespace {
+
+using test::Edit;
+using test::EditedReference;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+struct Fault {
+  const char* name;
+  const char* check;  // that must catch it
+  const char* field;
+  Edit edit;
+};
+void PrintTo(const Fault& fault, std::ostream* out) { *out << fault.name; }
+
+Edit scene_edit(std::function<void(Scene&)> change) {
+  Edit edit;
+  edit.loaded = [change](Scene& scene, ParticleState&) { change(scene); };
+  return edit;
+}
+
+Edit state_edit(std::function<void(ParticleState&)> change) {
+  Edit edit;
+  edit.loaded = [change](Scene&, ParticleState& state) { change(state); };
+  return edit;
+}
+
+Edit list_edit(std::function<void(Neighbors&)> change) {
+  Edit edit;
+  edit.found = [change](const Scene&, Neighbors& near, Eigen::VectorXd&) { change(near); };
+  return edit;
+}
+
+Edit field_edit(std::function<void(const Scene&, Fields&)> change) {
+  Edit edit;
+  edit.evaluated = std::move(change);
+  return edit;
+}
+
+Edit result_edit(std::function<void(ParticleState&)> change) {
+  Edit edit;
+  edit.advanced = std::move(change);
+  return edit;
+}
+
+std::vector<std::int32_t>& longest(std::vector<std::vector<std::int32_t>>& lists) {
+  return *std::max_element(lists.begin(), lists.end(),
+                           [](const auto& a, const auto& b) { return a.size() < b.size(); });
+}
+
+Edit volume_edit() {
+  Edit edit;
+  edit.found = [](const Scene& scene, Neighbors&, Eigen::VectorXd& volumes) {
+    volumes.setConstant(std::pow(scene.particle_spacing, 3));
+  };
+  edit.evaluated = [](const Scene& scene, Fields& out) {
+    out.boundary_volume.setConstant(std::pow(scene.particle_spacing, 3));
+  };
+  return edit;
+}
+
+const Fault catalogue[] = {
+    {"DroppedNeighbor", "neighbors", "fluid_neighbor_count",
+     list_edit([](Neighbors& n) { longest(n.fluid).pop_back(); })},
+    {"DroppedNeighborShowsInDensity", "density", "density", list_edit([](Neighbors& n) {
+       for (auto& list : n.fluid)
+         if (list.size() > 20) list.pop_back();
+     })},
+    {"NeighborCountedTwice", "neighbors", "fluid_neighbor_count",
+     list_edit([](Neighbors& n) { longest(n.fluid).push_back(longest(n.fluid).back()); })},
+    {"AnotherNeighborInItsPlace", "neighbors", "fluid_neighbor_id_sum", list_edit([](Neighbors& n) {
+       auto& list = longest(n.fluid);
+       list[0] = list[1];
+     })},
+    {"ListCutAtThirty", "neighbors", "fluid_neighbor_count", list_edit([](Neighbors& n) {
+       for (auto& list : n.fluid)
+         if (list.size() > 30) list.resize(30);
+     })},
+    {"DroppedWallNeighbor", "neighbors", "wall_neighbor_count",
+     list_edit([](Neighbors& n) { longest(n.wall).pop_back(); })},
+    {"NoWallTerm", "acceleration", "wall_pressure_acceleration", list_edit([](Neighbors& n) {
+       for (auto& list : n.wall) list.clear();
+     })},
+    {"WallsUnnormalised", "boundary_volume", "boundary_volume", volume_edit()},
+    {"DensityWithoutSelf", "density", "density", field_edit([](const Scene& s, Fields& f) {
+       f.density.array() -= s.particle_mass() * Kernel<double>(s.kernel, s.support_radius()).W(0);
+     })},
+    {"KernelConstantOffByOneInAHundredThousand", "density", "density",
+     field_edit([](const Scene&, Fields& f) { f.density *= 1 + 1e-5; })},
+    {"PressureTensionNotClamped", "pressure", "pressure",
+     scene_edit([](Scene& s) { s.fluid.allow_tension = true; })},
+    {"LinearEquationOfState", "pressure", "pressure",
+     scene_edit([](Scene& s) { s.fluid.eos_exponent = 1; })},
+    {"ViscosityOffByAPercent", "acceleration", "viscous_acceleration",
+     scene_edit([](Scene& s) { s.fluid.viscosity *= 1.01; })},
+    {"WallViscosityOffByAPercent", "acceleration", "wall_viscous_acceleration",
+     scene_edit([](Scene& s) { s.fluid.wall_viscosity *= 1.01; })},
+    {"GravityUpward", "acceleration", "acceleration",
+     scene_edit([](Scene& s) { s.gravity = -s.gravity; })},
+    {"SourceOneSubstepLate", "acceleration", "wall_pressure_acceleration",
+     state_edit([](ParticleState& s) { --s.substep; })},
+    {"VelocitiesOfAnotherOrder", "acceleration", "viscous_acceleration",
+     state_edit([](ParticleState& s) { s.velocity.col(0).swap(s.velocity.col(s.size() - 1)); })},
+    {"SwappedIds", "density", "density", field_edit([](const Scene&, Fields& f) {
+       Eigen::Index low, high;
+       f.density.minCoeff(&low);
+       f.density.maxCoeff(&high);
+       std::swap(f.density[low], f.density[high]);
+     })},
+    {"NanLane", "density", "density", field_edit([](const Scene&, Fields& f) {
+       for (Eigen::Index i = 7; i < f.density.size(); i += 32) f.density[i] = nan;
+     })},
+    {"OneValueNotWritten", "pressure", "pressure", field_edit([](const Scene&, Fields& f) {
+       f.pressure.tail(1) = Fields::unwritten(1, 0).pressure;
+     })},
+    {"NothingWritten", "evaluation", "acceleration", field_edit([](const Scene&, Fields& f) {
+       f = Fields::unwritten(f.density.size(), f.boundary_volume.size());
+     })},
+    {"TooFewValues", "density", "density", field_edit([](const Scene&, Fields& f) {
+       f.density.conservativeResize(f.density.size() - 1);
+     })},
+    {"HalfTheTimeStep", "substep", "velocity",
+     scene_edit([](Scene& s) { s.schedule.substeps_per_frame *= 2; })},
+    {"ContactCloserByAPercent", "substep", "position",
+     scene_edit([](Scene& s) { s.contact.distance_ratio *= 0.99; })},
+    {"NoFriction", "substep", "velocity", scene_edit([](Scene& s) { s.contact.friction = 0; })},
+    {"StateSwapped", "substep", "position",
+     result_edit([](ParticleState& s) { s.position.col(1).swap(s.position.col(2)); })},
+    {"StateNan", "substep", "velocity",
+     result_edit([](ParticleState& s) { s.velocity(2, 5) = nan; })},
+};
+
+class PlantedFault : public testing::TestWithParam<Fault> {
+ protected:
+  static Fixture recorded() {
+    return read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-stream.h5");
+  }
+};
+
+TEST_P(PlantedFault, FailsTheCheckThatIsThereForIt) {
+  const Fixture fixture = recorded();
+  EditedReference backend(GetParam().edit);
+  double margin = -1;
+  for (const CheckRow& row : judge(backend, fixture, prepare(fixture)))
+    if (row.check == GetParam().check && row.field == GetParam().field) {
+      EXPECT_EQ(judged_verdict(row), Verdict::fail) << "score " << row.score;
+      margin = row.score;
+    }
+  ASSERT_GT(margin, 1) << "no such check";
+  RecordProperty("margin", std::to_string(margin));
+}
+
+INSTANTIATE_TEST_SUITE_P(Catalogue, PlantedFault, testing::ValuesIn(catalogue),
+                         [](const auto& chosen) { return std::string(chosen.param.name); });
+
+TEST(NoFault, PassesEveryCheckFarWithinTolerance) {
+  const Fixture fixture = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-stream.h5");
+  EditedReference backend{Edit{}};
+  for (const CheckRow& row : judge(backend, fixture, prepare(fixture))) {
+    EXPECT_EQ(judged_verdict(row), Verdict::pass) << row.check << " " << row.field << row.reason;
+    EXPECT_LT(row.score, 1e-3) << row.check << " " << row.field;
+  }
+}
+
+/// Whatever field a NaN or an infinity is in, and wherever, some check on that field fails.
+TEST(NotANumber, NeverPasses) {
+  const Fixture fixture = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-stream.h5");
+  const Judgement oracle = prepare(fixture);
+  const std::vector<std::pair<std::string, Eigen::VectorXd Fields::*>> scalars = {
+      {"boundary_volume", &Fields::boundary_volume},
+      {"density", &Fields::density},
+      {"pressure", &Fields::pressure}};
+  const std::vector<std::pair<std::string, Eigen::Matrix3Xd Fields::*>> vectors = {
+      {"pressure_acceleration", &Fields::pressure_acceleration},
+      {"viscous_acceleration", &Fields::viscous_acceleration},
+      {"wall_pressure_acceleration", &Fields::wall_pressure_acceleration},
+      {"wall_viscous_acceleration", &Fields::wall_viscous_acceleration},
+      {"acceleration", &Fields::acceleration}};
+  const auto expect_fails = [&](const std::string& field, const Edit& edit) {
+    EditedReference backend(edit);
+    int failed = 0;
+    for (const CheckRow& row : judge(backend, fixture, oracle))
+      failed += row.field == field && judged_verdict(row) == Verdict::fail;
+    EXPECT_GT(failed, 0) << field;
+  };
+  for (const double bad : {nan, -nan, std::numeric_limits<double>::infinity()}) {
+    for (const auto& [name, member] : scalars)
+      expect_fails(name,
+                   field_edit([&, m = member](const Scene&, Fields& f) { (f.*m)[11] = bad; }));
+    for (const auto& [name, member] : vectors)
+      expect_fails(name,
+                   field_edit([&, m = member](const Scene&, Fields& f) { (f.*m)(1, 17) = bad; }));
+  }
+}
+
+}  // namespace
+}  // namespace decant
