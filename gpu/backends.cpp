@@ -167,6 +167,8 @@ std::string executor_device(Executor executor) {
   return executor == Executor::host ? gpu::host::device() : std::string();
 }
 
+std::string thrust_version() { return gpu::host::thrust_version(); }
+
 std::unique_ptr<Backend> make_backend(std::string_view name, Executor executor,
                                       const std::string& options) {
   for (const Entry& entry : table) {

@@ -23,6 +23,9 @@ bool executor_available(Executor executor, std::string* why_not = nullptr);
 /// What the executor runs on: "NVIDIA H200, driver 13.0, sm_90" or "8 OpenMP threads".
 std::string executor_device(Executor executor);
 
+/// Of the host executor: "2.3.1".
+std::string thrust_version();
+
 /// Throws InputError for an unknown name or option, BackendError where the executor is missing.
 std::unique_ptr<Backend> make_backend(std::string_view name, Executor executor,
                                       const std::string& options = {});

@@ -51,6 +51,7 @@ class DeviceSolver {
 namespace host {
 std::unique_ptr<DeviceSolver> make_brute();
 std::string device();
+std::string thrust_version();
 }  // namespace host
 namespace cuda {
 std::unique_ptr<DeviceSolver> make_brute();

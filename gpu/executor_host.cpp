@@ -4,6 +4,7 @@
 #include "gpu/device_solver.hpp"
 
 #include <omp.h>
+#include <thrust/version.h>
 
 namespace decant::gpu::host {
 
@@ -12,6 +13,11 @@ std::unique_ptr<DeviceSolver> make_brute() { return std::make_unique<Pipeline<Br
 std::string device() {
   const int threads = omp_get_max_threads();
   return std::to_string(threads) + (threads == 1 ? " OpenMP thread" : " OpenMP threads");
+}
+
+std::string thrust_version() {
+  return std::to_string(THRUST_MAJOR_VERSION) + "." + std::to_string(THRUST_MINOR_VERSION) + "." +
+         std::to_string(THRUST_SUBMINOR_VERSION);
 }
 
 }  // namespace decant::gpu::host

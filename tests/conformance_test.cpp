@@ -34,7 +34,7 @@ Fixture answered(Fixture fixture) {
 }
 
 TEST(Fixtures, AreReproducedByTheReferenceOfToday) {
-  const auto files = fixtures_in(DECANT_SOURCE_DIR "/fixtures", false);
+  const auto files = fixtures_in(fixture_folder(), false);
   EXPECT_GE(files.size(), 6u);
   for (const auto& file : files) EXPECT_NO_THROW(prepare(read_fixture(file))) << file;
 }
@@ -69,7 +69,7 @@ class Conformance : public testing::TestWithParam<std::tuple<std::string, Execut
 
 TEST_P(Conformance, HoldsOnEverySmallFixture) {
   const auto tested = backend();
-  for (const auto& file : fixtures_in(DECANT_SOURCE_DIR "/fixtures", false))
+  for (const auto& file : fixtures_in(fixture_folder(), false))
     EXPECT_EQ(objections(*tested, read_fixture(file)), "") << file;
 }
 
