@@ -40,6 +40,7 @@ class Pipeline : public DeviceSolver {
     require_loaded();
     poses_.upload(poses);
     clear_trouble();
+    reset_fields();
     const std::vector<float> own_volume = wall_volume_.download(static_cast<std::size_t>(m_));
     if (!given.boundary_volume.empty()) wall_volume_.upload(given.boundary_volume);
     c_.any_periodic ? fields<true>(0, poses_.get(), &given) : fields<false>(0, poses_.get(), &given);
@@ -84,19 +85,25 @@ class Pipeline : public DeviceSolver {
     const auto n = static_cast<std::size_t>(n_), m = static_cast<std::size_t>(m_);
     position_.resize(static_cast<std::size_t>(padded(n_)));
     velocity_.resize(n);
-    density_.resize(n);
-    pressure_.resize(n);
     thermo_.resize(n);
-    for (auto* b : {&pressure_acceleration_, &viscous_acceleration_, &wall_pressure_acceleration_,
-                    &wall_viscous_acceleration_, &acceleration_})
-      b->resize(n);
-    for (auto* b : {&fluid_count_, &fluid_id_sum_, &wall_count_, &wall_id_sum_}) b->resize(n);
+    reset_fields();
     wall_local_.resize(static_cast<std::size_t>(padded(m_)));
     wall_.resize(static_cast<std::size_t>(padded(m_)));
     wall_velocity_.resize(m);
     wall_volume_.resize(m);
     wall_container_.resize(m);
     trouble_.resize(2);
+  }
+
+  /// What no pass writes after this reads as NaN or −1.
+  void reset_fields() {
+    const auto n = static_cast<std::size_t>(n_);
+    density_.resize(n);
+    pressure_.resize(n);
+    for (auto* b : {&pressure_acceleration_, &viscous_acceleration_, &wall_pressure_acceleration_,
+                    &wall_viscous_acceleration_, &acceleration_})
+      b->resize(n);
+    for (auto* b : {&fluid_count_, &fluid_id_sum_, &wall_count_, &wall_id_sum_}) b->resize(n);
   }
 
   /// Padding is nowhere: no comparison with NaN holds, so it is nobody's neighbor.

@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace decant {
 namespace {
 
@@ -21,13 +23,24 @@ Scene tilting_scene() {
 
 TEST(Phases, FollowFromTheTiltsFirstAndLastKey) {
   const Scene scene = tilting_scene();
-  const std::vector<std::pair<std::string, std::int64_t>> expected = {
-      {"start", 0},     {"settled", 200},  {"tilt-onset", 700}, {"stream", 1100},
-      {"splash", 1300}, {"filling", 1700}, {"rest", 3200}};
+  const auto& keys = scene.containers[1].tilt->keys;
+  const auto part_of_tilt = [&](double fraction) {
+    return keys.front().time + fraction * (keys.back().time - keys.front().time);
+  };
+  const std::vector<std::pair<std::string, double>> expected = {
+      {"start", 0},
+      {"settled", part_of_tilt(0)},
+      {"tilt-onset", part_of_tilt(0.25)},
+      {"stream", part_of_tilt(0.57)},
+      {"splash", part_of_tilt(0.65)},
+      {"filling", part_of_tilt(0.85)},
+      {"rest", scene.schedule.end}};
   ASSERT_EQ(phase_names().size(), expected.size());
   for (std::size_t k = 0; k < expected.size(); ++k) {
-    EXPECT_EQ(phase_names()[k], expected[k].first);
-    EXPECT_EQ(parse_phase(scene, expected[k].first).substep, expected[k].second);
+    const auto& [name, time] = expected[k];
+    EXPECT_EQ(phase_names()[k], name);
+    EXPECT_NEAR(phase_time(scene, name), time, 1e-12) << name;
+    EXPECT_EQ(parse_phase(scene, name).substep, std::llround(time / scene.time_step())) << name;
   }
 }
 

@@ -2,6 +2,7 @@
 /// A written scene reads back to the same bits, for scenes of every shape and option.
 #include "reference/scene_file.hpp"
 #include "reference/shapes.hpp"
+#include "tests/generators.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
@@ -12,7 +13,7 @@
 #include <filesystem>
 #include <vector>
 
-namespace decant {
+namespace decant::test {
 namespace {
 
 /// Every real of a scene, in a fixed order, as bits, so that −0 and 0 differ.
@@ -84,16 +85,6 @@ bool same(const Scene& a, const Scene& b) {
       return false;
   return Bits(a).all() == Bits(b).all();
 }
-
-/// A real from low to high whose last bits are in use.
-double real(double low, double high) {
-  const auto k = *rc::gen::resize(100, rc::gen::inRange<std::int64_t>(0, std::int64_t{1} << 53));
-  return low + (high - low) * static_cast<double>(k) * 0x1p-53;
-}
-
-int integer(int low, int high) { return *rc::gen::inRange(low, high + 1); }
-bool coin() { return *rc::gen::arbitrary<bool>(); }
-Vec3 vec(double low, double high) { return {real(low, high), real(low, high), real(low, high)}; }
 
 SolidBox box() {
   const Vec3 low = vec(-1, 1);
@@ -204,4 +195,4 @@ TEST(SceneRoundTrip, EveryShippedSceneReadsBackToTheSameBits) {
 }
 
 }  // namespace
-}  // namespace decant
+}  // namespace decant::test
