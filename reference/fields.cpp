@@ -112,17 +112,16 @@ void evaluate(const Scene& scene, const ParticleState& state, const PosedWalls& 
     Vector pressure = Vector::Zero(), viscous = Vector::Zero();
     for (const auto j : fluid_of(i)) {
       const Vector x_ij = separation(x_i, Vector(x.col(j)));
-      const Real r = x_ij.norm();
-      pressure += pressure_term(m, q[i], q[j], kernel.G(r), x_ij);
-      viscous += viscous_term(mu, m, rho[i], rho[j], v_i, Vector(v.col(j)), kernel.L(r));
+      const Real r = x_ij.norm(), G = kernel.G(r), L = kernel.L(r, G);
+      pressure += pressure_term(m, q[i], q[j], G, x_ij);
+      viscous += viscous_term(mu, m, rho[i], rho[j], v_i, Vector(v.col(j)), L);
     }
     Vector wall_pressure = Vector::Zero(), wall_viscous = Vector::Zero();
     for (const auto b : wall_of(i)) {
       const Vector x_ib = separation(x_i, Vector(x_wall.col(b)));
-      const Real r = x_ib.norm();
-      wall_pressure += wall_pressure_term(rho0, V[b], q[i], kernel.G(r), x_ib);
-      wall_viscous +=
-          wall_viscous_term(mu_w, V[b], rho[i], v_i, Vector(v_wall.col(b)), kernel.L(r));
+      const Real r = x_ib.norm(), G = kernel.G(r), L = kernel.L(r, G);
+      wall_pressure += wall_pressure_term(rho0, V[b], q[i], G, x_ib);
+      wall_viscous += wall_viscous_term(mu_w, V[b], rho[i], v_i, Vector(v_wall.col(b)), L);
     }
     out.pressure_acceleration.col(i) = pressure.template cast<double>();
     out.viscous_acceleration.col(i) = viscous.template cast<double>();

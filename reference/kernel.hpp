@@ -75,9 +75,11 @@ class Kernel {
 
   /// L(r), 1/m⁵: 2r²G/(r² + 0.01h²) (Morris et al., J. Comput. Phys. 136 (1997), eq. 22), and for
   /// mueller2003 the Laplacian 45/(πH⁶)·(H − r) (Müller et al. 2003, eq. 22).
-  Real L(Real r) const {
+  Real L(Real r) const { return L(r, G(r)); }
+  /// The same where G(r) is known already.
+  Real L(Real r, Real G) const {
     if (family_ == KernelFamily::mueller2003) return g_ * (H_ - r);
-    return 2 * r * r * G(r) / (r * r + Real(0.01) * h_ * h_);
+    return 2 * r * r * G / (r * r + Real(0.01) * h_ * h_);
   }
 
   /// |W'(r)|, 1/m⁴.
