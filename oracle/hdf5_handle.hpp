@@ -22,6 +22,7 @@ class Handle {
     if (id_ >= 0) H5Idec_ref(id_);
   }
   hid_t get() const { return id_; }
+  hid_t release() { return std::exchange(id_, -1); }
   explicit operator bool() const { return id_ >= 0; }
 
  private:
@@ -48,6 +49,40 @@ inline std::string hdf5_message() {
 inline std::string parent_path(const std::string& path) {
   const auto slash = path.find_last_of('/');
   return slash == std::string::npos || slash == 0 ? "/" : path.substr(0, slash);
+}
+
+/// Whether a path's links are all there.
+inline bool exists(hid_t file, const std::string& path) {
+  for (std::size_t end = 0; end != std::string::npos && path != "/";) {
+    end = path.find('/', end + 1);
+    if (!(H5Lexists(file, path.substr(0, end).c_str(), H5P_DEFAULT) > 0)) return false;
+  }
+  return true;
+}
+
+/// Makes a group and those above it where they are missing; false where HDF5 refuses. No time of
+/// writing is kept, so that equal content is equal bytes.
+inline bool make_group(hid_t file, const std::string& path) {
+  const Handle creation(H5Pcreate(H5P_GROUP_CREATE));
+  H5Pset_obj_track_times(creation.get(), false);
+  for (std::size_t end = 0; end != std::string::npos && path != "/";) {
+    end = path.find('/', end + 1);
+    const std::string part = path.substr(0, end);
+    if (!exists(file, part) &&
+        !Handle(H5Gcreate2(file, part.c_str(), H5P_DEFAULT, creation.get(), H5P_DEFAULT)))
+      return false;
+  }
+  return true;
+}
+
+/// Creates a file in the format of HDF5 1.8, the first whose object headers carry checksums (later
+/// ones mark the file as open, which an image of it would keep).
+/// \param access  a file access list, which this sets up further
+inline Handle create_file(const std::string& file, const Handle& access) {
+  H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, H5F_LIBVER_V18);
+  const Handle creation(H5Pcreate(H5P_FILE_CREATE));
+  H5Pset_obj_track_times(creation.get(), false);
+  return Handle(H5Fcreate(file.c_str(), H5F_ACC_TRUNC, creation.get(), access.get()));
 }
 
 }  // namespace decant

@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
+#include <utility>
 
 namespace decant {
 namespace {
@@ -254,6 +255,13 @@ Hdf5Reader::Hdf5Reader(std::filesystem::path file) : file_(std::move(file)) {
   H5Pset_file_locking(access.get(), false, true);
   id_ = H5Fopen(file_.c_str(), H5F_ACC_RDONLY, access.get());
   if (id_ < 0) fail("file", hdf5_message(), "a whole HDF5 file");
+  // HDF5 1.10 reads beyond what it holds where older, unchecked headers are damaged.
+  H5F_info2_t info;
+  if (H5Fget_info2(id_, &info) < 0 || info.super.version < 2) {
+    H5Fclose(std::exchange(id_, -1));
+    fail("file", "in HDF5's format without checksums",
+         "of HDF5 1.8 or later (h5py: libver=\"v108\")");
+  }
 }
 
 Hdf5Reader::~Hdf5Reader() {
@@ -265,13 +273,7 @@ void Hdf5Reader::fail(const std::string& key, const std::string& value,
   throw InputError(file_.string(), key, value, bound);
 }
 
-bool Hdf5Reader::has(const std::string& path) const {
-  for (std::size_t end = 0; end != std::string::npos && path != "/";) {
-    end = path.find('/', end + 1);
-    if (!(H5Lexists(id_, path.substr(0, end).c_str(), H5P_DEFAULT) > 0)) return false;
-  }
-  return true;
-}
+bool Hdf5Reader::has(const std::string& path) const { return exists(id_, path); }
 
 std::vector<std::string> Hdf5Reader::children(const std::string& group) const {
   const Handle object = open_object(*this, id_, group);

@@ -30,21 +30,6 @@ Handle utf8_type(std::size_t size) {
   return type;
 }
 
-/// Links whose missing groups are made.
-Handle making_groups() {
-  Handle links(H5Pcreate(H5P_LINK_CREATE));
-  H5Pset_create_intermediate_group(links.get(), 1);
-  return links;
-}
-
-bool exists(hid_t file, const std::string& path) {
-  for (std::size_t end = 0; end != std::string::npos && path != "/";) {
-    end = path.find('/', end + 1);
-    if (!(H5Lexists(file, path.substr(0, end).c_str(), H5P_DEFAULT) > 0)) return false;
-  }
-  return true;
-}
-
 /// Writes all bytes; false, with errno, where the system refuses.
 bool write_all(int descriptor, const char* bytes, std::size_t size) {
   while (size > 0) {
@@ -83,7 +68,7 @@ Hdf5Writer::Hdf5Writer(std::filesystem::path file, int level)
   // In memory until commit: HDF5 1.10 crashes when a disk is full.
   const Handle access(H5Pcreate(H5P_FILE_ACCESS));
   H5Pset_fapl_core(access.get(), memory_step, false);
-  id_ = H5Fcreate(temporary_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access.get());
+  id_ = create_file(temporary_.string(), access).release();
   if (id_ < 0) {
     discard();
     fail("file", hdf5_message());
@@ -113,7 +98,6 @@ void Hdf5Writer::dataset(const std::string& path, const Layout& layout, const vo
                          : H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr));
   const bool holds_values = std::find(dims.begin(), dims.end(), hsize_t{0}) == dims.end();
   const Handle creation(H5Pcreate(H5P_DATASET_CREATE));
-  // A time of writing would make equal content differ.
   H5Pset_obj_track_times(creation.get(), false);
   if (holds_values && !dims.empty() && level_ > 0) {
     std::vector<hsize_t> chunk = dims;
@@ -122,8 +106,8 @@ void Hdf5Writer::dataset(const std::string& path, const Layout& layout, const vo
     H5Pset_shuffle(creation.get());
     H5Pset_deflate(creation.get(), static_cast<unsigned>(level_));
   }
-  const Handle links = making_groups();
-  const Handle data(H5Dcreate2(id_, path.c_str(), layout.file_type, space.get(), links.get(),
+  group(parent_path(path));
+  const Handle data(H5Dcreate2(id_, path.c_str(), layout.file_type, space.get(), H5P_DEFAULT,
                                creation.get(), H5P_DEFAULT));
   if (!data) fail(path, hdf5_message());
   if (holds_values &&
@@ -188,10 +172,7 @@ void Hdf5Writer::text(const std::string& path, std::string_view text,
 }
 
 void Hdf5Writer::group(const std::string& path) {
-  if (exists(id_, path)) return;
-  const Handle links = making_groups();
-  if (!Handle(H5Gcreate2(id_, path.c_str(), links.get(), H5P_DEFAULT, H5P_DEFAULT)))
-    fail(path, hdf5_message());
+  if (!make_group(id_, path)) fail(path, hdf5_message());
 }
 
 namespace {
@@ -232,13 +213,15 @@ void Hdf5Writer::attribute(const std::string& object, const std::string& name, s
 }
 
 void Hdf5Writer::commit() {
+  // The driver's own memory: H5Fget_file_image clears a flag and leaves its checksum as it was.
+  void* memory = nullptr;
   const ssize_t size =
-      H5Fflush(id_, H5F_SCOPE_GLOBAL) < 0 ? -1 : H5Fget_file_image(id_, nullptr, 0);
+      H5Fflush(id_, H5F_SCOPE_GLOBAL) < 0 || H5Fget_vfd_handle(id_, H5P_DEFAULT, &memory) < 0
+          ? -1
+          : H5Fget_file_image(id_, nullptr, 0);
   if (size < 0) fail("file", hdf5_message());
-  std::vector<char> image(static_cast<std::size_t>(size));
-  if (H5Fget_file_image(id_, image.data(), image.size()) != size) fail("file", hdf5_message());
-  if (!write_all(descriptor_, image.data(), image.size()) || ::fsync(descriptor_) != 0 ||
-      ::close(std::exchange(descriptor_, -1)) != 0)
+  if (!write_all(descriptor_, *static_cast<const char**>(memory), static_cast<std::size_t>(size)) ||
+      ::fsync(descriptor_) != 0 || ::close(std::exchange(descriptor_, -1)) != 0)
     fail("file", std::strerror(errno));
   std::error_code error;
   std::filesystem::rename(temporary_, file_, error);

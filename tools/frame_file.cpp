@@ -111,15 +111,16 @@ void put_scene(hid_t file, const Scene& scene) {
 }
 
 std::uint64_t create_dataset(hid_t file, const DatasetPlan& d) {
-  const Handle links(H5Pcreate(H5P_LINK_CREATE)), creation(H5Pcreate(H5P_DATASET_CREATE));
-  H5Pset_create_intermediate_group(links.get(), 1);
+  const Handle creation(H5Pcreate(H5P_DATASET_CREATE));
   H5Pset_layout(creation.get(), H5D_CONTIGUOUS);
   H5Pset_alloc_time(creation.get(), H5D_ALLOC_TIME_EARLY);
   H5Pset_fill_time(creation.get(), H5D_FILL_TIME_NEVER);
   // Two pours of the same scene are to give the same file.
   H5Pset_obj_track_times(creation.get(), false);
   const Handle space(H5Screate_simple(static_cast<int>(d.shape.size()), d.shape.data(), nullptr));
-  const Handle dataset(H5Dcreate2(file, d.path.c_str(), d.type, space.get(), links.get(),
+  if (!make_group(file, parent_path(d.path)))
+    throw std::runtime_error("dataset " + d.path + ": " + hdf5_message());
+  const Handle dataset(H5Dcreate2(file, d.path.c_str(), d.type, space.get(), H5P_DEFAULT,
                                   creation.get(), H5P_DEFAULT));
   if (!dataset) throw std::runtime_error("dataset " + d.path + ": " + hdf5_message());
   if (!d.unit.empty()) put_text(dataset.get(), "unit", d.unit);
@@ -222,7 +223,7 @@ FrameFile FrameFile::create(const std::filesystem::path& file, const Scene& scen
   FrameFile out(file, layout);
   try {
     const Handle access = without_locks();
-    const Handle id(H5Fcreate(file.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access.get()));
+    const Handle id = create_file(file.string(), access);
     if (!id) throw std::runtime_error("cannot be created: " + hdf5_message());
     for (const auto& [name, text] : texts) put_text(id.get(), name, text);
     put_scene(id.get(), scene);
