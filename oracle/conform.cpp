@@ -289,11 +289,22 @@ void require_reproduced(const Fixture& fixture, const OracleAnswer& today) {
 
 }  // namespace
 
-void evaluate_oracle(const Scene& scene, const ParticleState& state, Fields& fields,
-                     ConditionSums& condition) {
+std::string evaluate_oracle(const Scene& scene, const ParticleState& state, Fields& fields,
+                            ConditionSums& condition) {
   OracleAnswer a = answer(scene, sample_walls(scene), state);
+  const auto objection = [](const std::vector<bool>& ambiguous, std::int64_t most,
+                            const char* kind) {
+    const auto count = std::count(ambiguous.begin(), ambiguous.end(), true);
+    return count <= most ? std::string()
+                         : fmt::format("{} particles have {} neighbors too near H for fp32 to place, "
+                                       "at most {} expected; ",
+                                       count, kind, most);
+  };
+  const std::string why = objection(a.fluid_ambiguous, a.most_fluid_ambiguous, "fluid") +
+                          objection(a.wall_ambiguous, a.most_wall_ambiguous, "wall");
   fields = std::move(a.fields);
   condition = std::move(a.condition);
+  return why.empty() ? why : why + "no backend can pass (a lattice? let it move first)";
 }
 
 Judgement prepare(const Fixture& fixture) {

@@ -10,6 +10,7 @@
 #include "oracle/tolerance.hpp"
 
 #include <memory>
+#include <string>
 #include <vector>
 
 namespace decant {
@@ -24,9 +25,11 @@ struct Judgement {
   SubstepAnswer substep;
 };
 
-/// Fields and condition sums at one state, as a fixture records them.
-void evaluate_oracle(const Scene& scene, const ParticleState& state, Fields& fields,
-                     ConditionSums& condition);
+/// Fields and condition sums at one state, as a fixture records them. Returns why no backend can
+/// pass on that state, for people to read; empty for a sound one. A lattice has thousands of pairs
+/// at one distance, and where that is H nearly, fp32 cannot tell who is a neighbor.
+std::string evaluate_oracle(const Scene& scene, const ParticleState& state, Fields& fields,
+                            ConditionSums& condition);
 
 /// Evaluates the oracle on the fixture's state. Throws InputError where the recorded fields are not
 /// what this build's reference gives within the tolerances scaled from 2⁻²⁴ to 2⁻⁵³.

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <ostream>
 
 namespace decant {
 namespace {
@@ -20,6 +21,8 @@ struct Choice {
   std::string name;
   Executor executor;
 };
+
+void PrintTo(const Choice& choice, std::ostream* out) { *out << choice.name; }
 
 std::vector<Choice> choices() {
   std::vector<Choice> all = {{"reference", Executor::host}};

@@ -184,7 +184,8 @@ int record(const RecordArguments& arguments) {
     backend->read(fixture.state);
     fixture.state.substep = now;
     fixture.state.quantise();
-    evaluate_oracle(scene, fixture.state, fixture.fields.emplace(), fixture.condition.emplace());
+    const std::string weakness = evaluate_oracle(scene, fixture.state, fixture.fields.emplace(),
+                                                 fixture.condition.emplace());
     if (arguments.sample) reduce_to_sample(fixture);
     fixture.provenance = provenance_of(arguments, info, start);
     const std::string file = phase_file(arguments.out, phase.name);
@@ -193,6 +194,7 @@ int record(const RecordArguments& arguments) {
     if (!arguments.quiet)
       fmt::print("{}: {} at {:.6g} s, substep {}, {} bytes\n", file, phase.name, scene.time_at(now),
                  now, std::filesystem::file_size(file));
+    if (!weakness.empty()) fmt::print(stderr, "warning: {}: {}\n", file, weakness);
     std::fflush(stdout);
   }
   return exit_pass;
