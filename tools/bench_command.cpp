@@ -135,7 +135,10 @@ void write_json(const std::string& file, const nlohmann::ordered_json& rows) {
 int bench(const BenchArguments& arguments) {
   std::vector<std::unique_ptr<Backend>> backends;
   auto names = arguments.backends;
-  if (names.empty()) names = backend_choices();
+  if (names.empty()) {
+    names = backend_choices();
+    if (arguments.executor == "cuda") std::erase(names, "reference");
+  }
   for (const auto& name : names) backends.push_back(choose_backend(name, arguments.executor));
   std::vector<std::filesystem::path> files(arguments.fixtures.begin(), arguments.fixtures.end());
   if (files.empty()) files = fixtures_in(fixture_folder(), false);
@@ -169,7 +172,7 @@ void add_bench_command(CLI::App& app, int& exit_status) {
   verb->footer(footer);
   verb->add_option("FIXTURE", arguments->fixtures, "Recordings (*.h5); default: the small ones");
   verb->add_option("--backend", arguments->backends,
-                   "reference,reference:all-pairs,brute,…; default: all")
+                   "reference,reference:all-pairs,brute,…; default: all that the executor runs")
       ->delimiter(',')
       ->allow_extra_args(false);
   verb->add_option("--executor", arguments->executor, "auto, cuda or host")->capture_default_str();

@@ -1,0 +1,130 @@
+/// \file
+/// Where the audit says water is, and what it calls a way through a wall, against states whose
+/// answer is plain.
+#include "oracle/audit.hpp"
+#include "reference/pose.hpp"
+#include "tests/falling_points.hpp"
+#include "tests/generators.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace decant::test {
+namespace {
+
+/// The tilting cup around (−0.3, 0, 0.3), 5 cm wide and 10 cm high inside, walls of 4 cm; the fixed
+/// one, 10 cm wide and high, around the origin; a floor far below both.
+Scene two_cups() {
+  Scene scene = falling_points_scene();
+  scene.floor = Floor{-0.5};
+  return scene;
+}
+
+ParticleState at_rest(const Eigen::Matrix3Xd& x, std::int64_t substep = 0) {
+  ParticleState state = state_of(x, Eigen::Matrix3Xd::Zero(3, x.cols()));
+  state.substep = substep;
+  return state;
+}
+
+Place place_of(const Vec3& x) {
+  Audit audit(two_cups());
+  return static_cast<Place>(audit.look(at_rest(x)).place.at(0));
+}
+
+TEST(Audit, TellsThePlacesApart) {
+  EXPECT_EQ(place_of(Vec3(-0.3, 0, 0.35)), Place::source);
+  EXPECT_EQ(place_of(Vec3(0, 0.05, 0.02)), Place::receiver);
+  EXPECT_EQ(place_of(Vec3(-0.15, 0, 0.35)), Place::in_flight);
+  EXPECT_EQ(place_of(Vec3(0, 0, 0.15)), Place::in_flight) << "above the receiver";
+  EXPECT_EQ(place_of(Vec3(0.4, 0, -0.495)), Place::spilled);
+  EXPECT_EQ(place_of(Vec3(0.4, 0, 1.5)), Place::lost);
+  EXPECT_EQ(place_of(Vec3(0, std::numeric_limits<double>::quiet_NaN(), 0)), Place::lost);
+}
+
+TEST(Audit, CountsEveryParticleOnce) {
+  EXPECT_TRUE(rc::check("places add up", [] {
+    const Scene scene = two_cups();
+    Audit audit(scene);
+    const int n = integer(0, 300);
+    const AuditResult seen = audit.look(at_rest(any_cloud(n, -1.2, 1.2)));
+    std::int64_t all = 0;
+    double mass = 0;
+    for (std::size_t p = 0; p < place_names.size(); ++p) {
+      all += seen.particles_at[p];
+      mass += seen.mass_at[p];
+    }
+    RC_ASSERT(all == n);
+    RC_ASSERT(std::abs(mass - n * scene.particle_mass()) <= 1e-12 * (1 + mass));
+  }));
+}
+
+TEST(Audit, FollowsTheSourceAsItTilts) {
+  const Scene scene = two_cups();
+  const Vec3 inside(0, 0, 0.05);  // of the source, in its frame
+  const std::int64_t last = 60;
+  Audit audit(scene);
+  for (std::int64_t substep = 0; substep <= last; ++substep) {
+    const Pose pose = pose_at(scene.containers[0], scene.time_at(substep));
+    const AuditResult seen = audit.look(at_rest(pose.to_world(inside), substep));
+    EXPECT_EQ(seen.place[0], static_cast<std::uint8_t>(Place::source)) << substep;
+    EXPECT_EQ(seen.crossed, 0) << "it rests while the cup moves";
+  }
+  EXPECT_GT((pose_at(scene.containers[0], scene.time_at(last)).to_world(inside) -
+             scene.containers[0].origin - inside)
+                .norm(),
+            0.1);
+}
+
+TEST(Audit, SeesAParticleInAWallAndHowDeep) {
+  Audit audit(two_cups());
+  Eigen::Matrix3Xd x(3, 2);
+  x.col(0) = Vec3(0, 0, 0.05);
+  x.col(1) = Vec3(0.107, 0, 0.05);  // 7 mm into the receiver's wall
+  const AuditResult seen = audit.look(at_rest(x));
+  EXPECT_EQ(seen.inside, 1);
+  EXPECT_EQ(seen.deepest_particle, 1);
+  EXPECT_NEAR(seen.deepest, 0.007, 1e-12);
+  EXPECT_EQ(seen.crossed, 0) << "nothing was looked at before";
+}
+
+TEST(Audit, SeesAWayThroughAWallWhoseEndsAreBothFree) {
+  const Vec3 inside(0.08, 0, 0.05), outside(0.17, 0, 0.05), below(0, 0, -0.06), above(0.12, 0, 0.2);
+  const auto crossings = [](const Vec3& from, const Vec3& to) {
+    Audit audit(two_cups());
+    EXPECT_EQ(audit.look(at_rest(from, 0)).crossed, 0);
+    const AuditResult seen = audit.look(at_rest(to, 1));
+    EXPECT_EQ(seen.inside, 0);
+    EXPECT_EQ(seen.first_crossed, seen.crossed > 0 ? 0 : -1);
+    return seen.crossed;
+  };
+  EXPECT_EQ(crossings(inside, outside), 1);
+  EXPECT_EQ(crossings(outside, inside), 1);
+  EXPECT_EQ(crossings(Vec3(0, 0, 0.01), below), 1);
+  EXPECT_EQ(crossings(Vec3(0.08, 0, 0.099), above), 0) << "over the rim";
+  EXPECT_EQ(crossings(inside, Vec3(-0.08, 0, 0.05)), 0) << "across the cavity";
+}
+
+TEST(Audit, SeesAWallThatSweepsOverARestingParticle) {
+  const Scene scene = two_cups();
+  // In the source, near the wall that the tilt brings towards it.
+  const Vec3 x = scene.containers[0].origin + Vec3(-0.045, 0, 0.01);
+  Audit audit(scene);
+  ASSERT_EQ(audit.look(at_rest(x, 0)).inside, 0);
+  EXPECT_EQ(audit.look(at_rest(x, 60)).crossed, 1);
+}
+
+TEST(Audit, AddsUpEnergies) {
+  const Scene scene = two_cups();
+  Audit audit(scene);
+  Eigen::Matrix3Xd x(3, 2), v(3, 2);
+  x << 0, 0.3, 0, 0, 0.05, 0.4;
+  v << 3, 0, 4, 0, 0, -2;
+  const AuditResult seen = audit.look(state_of(x, v));
+  EXPECT_NEAR(seen.kinetic_energy, scene.particle_mass() * (12.5 + 2), 1e-15);
+  EXPECT_NEAR(seen.potential_energy, scene.particle_mass() * 9.81 * 0.45, 1e-15);
+  EXPECT_EQ(seen.max_speed, 5);
+}
+
+}  // namespace
+}  // namespace decant::test
