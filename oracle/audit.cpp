@@ -55,7 +55,9 @@ AuditResult Audit::look(const ParticleState& state) {
     if (outside(scene_.domain, x)) place = static_cast<std::uint8_t>(Place::lost);
     result.kinetic_energy += 0.5 * mass * v.squaredNorm();
     result.potential_energy -= mass * scene_.gravity.dot(x);
-    if (!(v.norm() <= result.max_speed)) result.max_speed = v.norm();
+    // NaN once seen stays.
+    if (!(v.norm() <= result.max_speed) && !std::isnan(result.max_speed))
+      result.max_speed = v.norm();
   }
 
   bool source_seen = false;

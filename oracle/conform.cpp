@@ -23,6 +23,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// Error over tolerance; a tolerance of 0 asks for equality.
 double score_of(double error, double tolerance) {
+  if (!(tolerance >= 0 && tolerance < infinity)) return infinity;
   if (error == 0) return 0;
   const double score = error / tolerance;
   return score >= 0 ? score : infinity;  // NaN, whatever made it
@@ -35,6 +36,8 @@ struct Values {
   int components = 1;
   const std::vector<bool>* excluded = nullptr;
   std::int64_t most_excluded = 0;
+  // What an excluded value must keep all the same: sane, if not precise.
+  double excluded_least = -infinity, excluded_tolerance = infinity;
 };
 
 template <class Matrix>
@@ -60,10 +63,14 @@ void compare(const Values& v, CheckRow& row) {
     const auto particle = static_cast<std::size_t>(k / v.components);
     if (v.excluded && (*v.excluded)[particle]) {
       if (k % v.components == 0) ++row.excluded;
-      row.error[k] = 0;
-      continue;
+      if (std::isfinite(v.got[k]) && v.got[k] >= v.excluded_least &&
+          row.error[k] <= v.excluded_tolerance) {
+        row.error[k] = 0;
+        continue;
+      }
     }
-    const double score = score_of(row.error[k], v.tolerance[k]);
+    const bool insane = v.excluded && (*v.excluded)[particle];
+    const double score = insane ? infinity : score_of(row.error[k], v.tolerance[k]);
     scores.push_back(score);
     if (score > worst) {
       worst = score;
@@ -85,6 +92,10 @@ void compare(const Values& v, CheckRow& row) {
   }
   row.verdict = row.score <= 1 ? Verdict::pass : Verdict::fail;
   if (row.verdict == Verdict::fail) row.reason = "beyond tolerance";
+  if (scores.empty() && n > 0) {
+    row.verdict = Verdict::fail;
+    row.reason = "every particle is ambiguous, nothing could be compared";
+  }
   if (v.excluded && !(row.excluded <= v.most_excluded)) {
     row.verdict = Verdict::fail;
     row.reason = std::to_string(row.excluded) + " ambiguous particles, at most " +
@@ -167,7 +178,7 @@ void judge_neighbors(const Fields& got, const OracleAnswer& oracle, Sheet& sheet
   for (const Fact& fact : facts) {
     const Eigen::VectorXd expected = flat(oracle.fields.*fact.member);
     compare({flat(got.*fact.member), expected, Eigen::VectorXd::Zero(expected.size()), {}, 1,
-             fact.ambiguous, fact.most},
+             fact.ambiguous, fact.most, 0.0},
             sheet.row("neighbors", fact.name, "1"));
   }
 }
@@ -215,13 +226,20 @@ const SubstepOutcome& nearest_outcome(const std::vector<SubstepOutcome>& outcome
   return *nearest;
 }
 
-void judge_substep(Backend& backend, const Judgement& oracle, Sheet& sheet) {
+void judge_substep(Backend& backend, const Fixture& fixture, const Judgement& oracle,
+                   Sheet& sheet) {
   if (const Status status = backend.advance(1); !status.ok())
     return sheet.failed("substep", describe(status));
   ParticleState got;
   backend.read(got);
   const SubstepAnswer& answer = oracle.substep;
   const auto n = static_cast<Eigen::Index>(answer.outcomes.size());
+  if (got.position.cols() != n || got.velocity.cols() != n)
+    return sheet.failed("substep", fmt::format("{} positions and {} velocities, not {}",
+                                               got.position.cols(), got.velocity.cols(), n));
+  if (got.substep != fixture.state.substep + 1)
+    return sheet.failed("substep", fmt::format("is at substep {}, not {}", got.substep,
+                                               fixture.state.substep + 1));
   Eigen::Matrix3Xd x(3, n), v(3, n), tau_x(3, n), tau_v(3, n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const SubstepOutcome& nearest = nearest_outcome(answer.outcomes[static_cast<std::size_t>(i)],
@@ -231,11 +249,12 @@ void judge_substep(Backend& backend, const Judgement& oracle, Sheet& sheet) {
     tau_x.col(i) = nearest.position_tolerance;
     tau_v.col(i) = nearest.velocity_tolerance;
   }
+  // An undecidable push is no longer than a particle spacing and no faster than sound.
   compare({flat(got.position), flat(x), flat(tau_x), {}, 3, &answer.ambiguous,
-           answer.most_ambiguous},
+           answer.most_ambiguous, -infinity, fixture.scene.particle_spacing},
           sheet.row("substep", "position", "m"));
   compare({flat(got.velocity), flat(v), flat(tau_v), {}, 3, &answer.ambiguous,
-           answer.most_ambiguous},
+           answer.most_ambiguous, -infinity, fixture.scene.fluid.sound_speed},
           sheet.row("substep", "velocity", "m/s"));
 }
 
@@ -327,7 +346,7 @@ std::vector<CheckRow> judge(Backend& backend, const Fixture& fixture, const Judg
   try {
     backend.load(fixture.scene, oracle.walls, fixture.state);
     judge_fields(backend, oracle, sheet);
-    judge_substep(backend, oracle, sheet);
+    judge_substep(backend, fixture, oracle, sheet);
   } catch (const std::exception& error) {
     sheet.failed("run", error.what());
   }

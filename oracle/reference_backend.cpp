@@ -33,6 +33,12 @@ class ReferenceBackend : public Backend {
   }
 
   Status advance(int substeps) override {
+    // A position that is no number has no cell.
+    if (substeps > 0)
+      if (Status status = check(); status.bits & Status::non_finite) {
+        ++status.substep;
+        return status;
+      }
     for (int k = 0; k < substeps; ++k) {
       solver().substep();
       if (const Status status = check(); !status.ok()) return status;

@@ -177,6 +177,38 @@ TEST(NoFault, PassesEveryCheckFarWithinTolerance) {
   }
 }
 
+/// What is left out of a comparison, because fp32 cannot decide it, must be sane all the same.
+TEST(NotANumber, DoesNotHideAmongTheAmbiguous) {
+  const Fixture fixture = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-stream.h5");
+  const Judgement oracle = prepare(fixture);
+  const auto chosen = [](const std::vector<bool>& ambiguous) {
+    return std::find(ambiguous.begin(), ambiguous.end(), true) - ambiguous.begin();
+  };
+  const Eigen::Index contact = chosen(oracle.substep.ambiguous),
+                     near_wall = chosen(oracle.own.wall_ambiguous);
+  ASSERT_LT(contact, fixture.state.size());
+  ASSERT_LT(near_wall, fixture.state.size());
+  const auto verdict = [&](const Edit& edit, const std::string& field) {
+    EditedReference backend(edit);
+    for (const CheckRow& row : judge(backend, fixture, oracle))
+      if (row.field == field) return judged_verdict(row);
+    return Verdict::not_run;
+  };
+  for (const double bad : {nan, 1e30}) {
+    EXPECT_EQ(
+        verdict(result_edit([&](ParticleState& s) { s.position(0, contact) = bad; }), "position"),
+        Verdict::fail);
+    EXPECT_EQ(
+        verdict(result_edit([&](ParticleState& s) { s.velocity(2, contact) = bad; }), "velocity"),
+        Verdict::fail);
+  }
+  EXPECT_EQ(verdict(field_edit([&](const Scene&, Fields& f) {
+                      f.wall_neighbor_count[near_wall] = -1;
+                    }),
+                    "wall_neighbor_count"),
+            Verdict::fail);
+}
+
 /// Whatever field a NaN or an infinity is in, and wherever, some check on that field fails.
 TEST(NotANumber, NeverPasses) {
   const Fixture fixture = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-stream.h5");

@@ -2,7 +2,7 @@
 
 set(DECANT_VERSION_DIR ${PROJECT_BINARY_DIR}/generated)
 string(TOUPPER "${CMAKE_BUILD_TYPE}" build_type)
-string(STRIP "${CMAKE_CXX_FLAGS} ${CMAKE_CXX_FLAGS_${build_type}} -ffp-contract=off" flags)
+string(STRIP "${CMAKE_CXX_FLAGS} ${CMAKE_CXX_FLAGS_${build_type}} -ffp-contract=off -fno-math-errno -fno-trapping-math" flags)
 if(DECANT_SANITIZE)
   string(APPEND flags " -fsanitize=${DECANT_SANITIZE}")
 endif()
