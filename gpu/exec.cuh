@@ -115,6 +115,7 @@ class Buffer {
   void release() {
     cudaFree(data_);  // a destructor has nobody to report to
     data_ = nullptr;
+    size_ = 0;
   }
 #else
   static void* allocate(std::size_t bytes) {
@@ -132,6 +133,7 @@ class Buffer {
   void release() {
     ::operator delete(data_, std::align_val_t(64));
     data_ = nullptr;
+    size_ = 0;
   }
 #endif
   T* data_ = nullptr;

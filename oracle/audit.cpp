@@ -52,7 +52,7 @@ AuditResult Audit::look(const ParticleState& state) {
     auto& place = result.place[static_cast<std::size_t>(i)];
     if (scene_.floor && x.z() - scene_.floor->height < scene_.support_radius())
       place = static_cast<std::uint8_t>(Place::spilled);
-    if (outside(scene_.domain, x)) place = static_cast<std::uint8_t>(Place::lost);
+    if (outside(scene_.domain, x) || !v.allFinite()) place = static_cast<std::uint8_t>(Place::lost);
     result.kinetic_energy += 0.5 * mass * v.squaredNorm();
     result.potential_energy -= mass * scene_.gravity.dot(x);
     // NaN once seen stays.

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <exception>
 #include <limits>
+#include <optional>
 
 #if __FINITE_MATH_ONLY__
 #error "compiled with -ffinite-math-only a comparator cannot see NaN"
@@ -106,8 +107,7 @@ void compare(const Values& v, CheckRow& row) {
 /// Rows of one backend on one fixture, in order.
 class Sheet {
  public:
-  Sheet(const Backend& backend, const Fixture& fixture) {
-    const BackendInfo info = backend.info();
+  Sheet(const BackendInfo& info, const Fixture& fixture) {
     common_.backend = info.name;
     common_.options = info.options;
     common_.executor = info.executor;
@@ -342,15 +342,17 @@ Judgement prepare(const Fixture& fixture) {
 }
 
 std::vector<CheckRow> judge(Backend& backend, const Fixture& fixture, const Judgement& oracle) {
-  Sheet sheet(backend, fixture);
+  std::optional<Sheet> sheet;
   try {
+    sheet.emplace(backend.info(), fixture);
     backend.load(fixture.scene, oracle.walls, fixture.state);
-    judge_fields(backend, oracle, sheet);
-    judge_substep(backend, fixture, oracle, sheet);
+    judge_fields(backend, oracle, *sheet);
+    judge_substep(backend, fixture, oracle, *sheet);
   } catch (const std::exception& error) {
-    sheet.failed("run", error.what());
+    if (!sheet) sheet.emplace(BackendInfo{}, fixture);  // it cannot even say what it is
+    sheet->failed("run", error.what());
   }
-  return sheet.take();
+  return sheet->take();
 }
 
 }  // namespace decant

@@ -6,6 +6,7 @@
 #include "tools/backend_choice.hpp"
 #include "tools/commands.hpp"
 #include "tools/fixture_folder.hpp"
+#include "tools/output_place.hpp"
 #include "version.hpp"
 
 #include <fmt/format.h>
@@ -133,6 +134,7 @@ void write_json(const std::string& file, const nlohmann::ordered_json& rows) {
 }
 
 int bench(const BenchArguments& arguments) {
+  check_output_place("--json", arguments.json);
   std::vector<std::unique_ptr<Backend>> backends;
   auto names = arguments.backends;
   if (names.empty()) {
@@ -168,21 +170,21 @@ int bench(const BenchArguments& arguments) {
 
 void add_bench_command(CLI::App& app, int& exit_status) {
   auto arguments = std::make_shared<BenchArguments>();
-  CLI::App* verb = app.add_subcommand("bench", "Time a substep of backends that conform");
+  CLI::App* verb = app.add_subcommand("bench", "time a substep of backends that conform");
   verb->footer(footer);
-  verb->add_option("FIXTURE", arguments->fixtures, "Recordings (*.h5); default: the small ones");
+  verb->add_option("FIXTURE", arguments->fixtures, "recordings (*.h5); default: the small ones");
   verb->add_option("--backend", arguments->backends,
                    "reference,reference:all-pairs,brute,…; default: all that the executor runs")
       ->delimiter(',')
       ->allow_extra_args(false);
   verb->add_option("--executor", arguments->executor, "auto, cuda or host")->capture_default_str();
-  verb->add_option("--substeps", arguments->substeps, "Substeps in a window")
+  verb->add_option("--substeps", arguments->substeps, "substeps in a window")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
-  verb->add_option("--windows", arguments->windows, "Windows to take the median of")
+  verb->add_option("--windows", arguments->windows, "windows to take the median of")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  verb->add_option("--json", arguments->json, "Write rows as JSON");
+  verb->add_option("--json", arguments->json, "write rows as JSON");
   verb->callback([arguments, &exit_status] { exit_status = bench(*arguments); });
 }
 

@@ -6,6 +6,7 @@
 #include "tools/backend_choice.hpp"
 #include "tools/commands.hpp"
 #include "tools/fixture_folder.hpp"
+#include "tools/output_place.hpp"
 #include "tools/progress.hpp"
 #include "version.hpp"
 
@@ -33,7 +34,8 @@ constexpr const char* footer =
     "DECANT_FIXTURES names), with --all every one. A check passes where no error exceeds its own\n"
     "tolerance: score = largest |error| / tolerance <= 1.\n"
     "Exit status: 0 all pass, 1 something does not conform, 2 bad input, 3 something could not "
-    "run,\n"
+    "run\n"
+    "(a backend that breaks down while it is judged does not conform),\n"
     "77 the device of --executor is absent.\n"
     "\n"
     "Example:\n"
@@ -183,6 +185,7 @@ std::string json_text(const Report& report, int status) {
 }
 
 int conform(const ConformArguments& arguments) {
+  check_output_place("--report", arguments.report);
   auto candidates = candidates_of(arguments);
   const auto fixtures = fixtures_of(arguments);
   const bool talks = !arguments.quiet && !arguments.json;
@@ -195,13 +198,15 @@ int conform(const ConformArguments& arguments) {
   Report report = judge_all(candidates, fixtures, !talks);
   add_provenance(report, candidates, fixtures);
   const int status = status_of(report, candidates);
-  if (!arguments.report.empty()) write_report(arguments.report, report);
   if (arguments.json)
     fmt::print("{}\n", json_text(report, status));
   else if (arguments.quiet)
     fmt::print("{}\n", verdict_line(report));
   else
     fmt::print("\n{}", console_table(report));
+  std::fflush(stdout);
+  // After the table: what was found out is not lost with a full disk.
+  if (!arguments.report.empty()) write_report(arguments.report, report);
   return status;
 }
 

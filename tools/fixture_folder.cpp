@@ -5,6 +5,7 @@
 #include "reference/error.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cstdlib>
 
 namespace decant {
@@ -13,7 +14,9 @@ namespace {
 namespace fs = std::filesystem;
 
 bool is_small(const fs::path& file) {
-  return file.filename().string().find("4k") != std::string::npos;
+  const std::string name = file.filename().string();
+  const auto at = name.find("4k");  // of 4,000 particles, not of 64,000
+  return at != std::string::npos && (at == 0 || !std::isdigit(static_cast<unsigned char>(name[at - 1])));
 }
 
 std::vector<fs::path> recordings(const fs::path& folder) {

@@ -77,7 +77,7 @@ void print(const nlohmann::ordered_json& info) {
 }  // namespace
 
 void add_info_command(CLI::App& app, int& exit_status) {
-  auto* command = app.add_subcommand("info", "Version, build, executors and libraries");
+  auto* command = app.add_subcommand("info", "version, build, executors and libraries");
   auto as_json = std::make_shared<bool>(false);
   command->add_flag("--json", *as_json, "Print JSON");
   command->footer("Example:\n  decant info --json");

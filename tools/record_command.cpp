@@ -9,6 +9,7 @@
 #include "tools/backend_choice.hpp"
 #include "tools/checkpoint.hpp"
 #include "tools/commands.hpp"
+#include "tools/output_place.hpp"
 #include "tools/phases.hpp"
 #include "tools/progress.hpp"
 #include "version.hpp"
@@ -122,12 +123,6 @@ std::vector<Phase> phases_of(const RecordArguments& arguments, const Scene& scen
   return phases;
 }
 
-void check_place(const std::string& out) {
-  const auto folder = std::filesystem::absolute(out).parent_path();
-  if (!std::filesystem::is_directory(folder))
-    throw InputError("command line", "--out", out, "a file in a folder that exists");
-}
-
 void advance_to(std::int64_t target, std::int64_t& now, const Scene& scene, Backend& backend,
                 Progress& progress, const std::string& phase) {
   const std::int64_t per_frame = scene.schedule.substeps_per_frame;
@@ -165,7 +160,7 @@ int record(const RecordArguments& arguments) {
   const Scene scene = load_scene(arguments.scene);
   const Start start = start_of(arguments, scene);
   const auto phases = phases_of(arguments, scene, start);
-  check_place(arguments.out);
+  check_output_place("--out", arguments.out);
   const auto backend = choose_backend(arguments.backend, arguments.executor);
   const BackendInfo info = backend->info();
   if (!arguments.quiet)
