@@ -18,8 +18,8 @@ using gpu::DeviceSolver;
 /// A backend under test is one line here and its query in a file of its own.
 struct Entry {
   const char* name;
-  std::unique_ptr<DeviceSolver> (*host)();
-  std::unique_ptr<DeviceSolver> (*cuda)();
+  std::unique_ptr<DeviceSolver> (*host)(const gpu::SolverOptions&);
+  std::unique_ptr<DeviceSolver> (*cuda)(const gpu::SolverOptions&);
 };
 
 #if DECANT_HAS_CUDA
@@ -30,6 +30,8 @@ struct Entry {
 
 const Entry table[] = {
     DECANT_ENTRY(brute),
+    DECANT_ENTRY(hash),
+    DECANT_ENTRY(list),
 };
 
 using FloatRows = Eigen::Matrix<float, 3, Eigen::Dynamic>;
@@ -125,7 +127,12 @@ class DeviceBackend : public Backend {
   }
 
   StageTimes stage_times() const override { return solver_->stage_times(); }
-  NeighborStats neighbor_stats() const override { return stats_; }
+  NeighborStats neighbor_stats() const override {
+    NeighborStats stats = stats_;
+    stats.rebuilds = solver_->rebuilds();
+    stats.device_bytes = static_cast<std::int64_t>(solver_->device_bytes());
+    return stats;
+  }
 
  private:
   const Scene& scene() const {
@@ -173,14 +180,12 @@ std::unique_ptr<Backend> make_backend(std::string_view name, Executor executor,
                                       const std::string& options) {
   for (const Entry& entry : table) {
     if (name != entry.name) continue;
-    if (!options.empty())
-      throw InputError("command line", "--backend", entry.name + (":" + options),
-                       std::string(entry.name) + " takes no options");
+    const gpu::SolverOptions parsed = gpu::parse_options(entry.name, options);
     std::string why_not;
     if (!executor_available(executor, &why_not))
       throw BackendError("executor cuda: " + why_not);
     const auto make = executor == Executor::host ? entry.host : entry.cuda;
-    return std::make_unique<DeviceBackend>(entry.name, executor, options, make());
+    return std::make_unique<DeviceBackend>(entry.name, executor, options, make(parsed));
   }
   std::string known;
   for (const Entry& entry : table) known += (known.empty() ? "" : ", ") + std::string(entry.name);

@@ -24,37 +24,39 @@ struct Clearance {
 DECANT_DEVICE float clamp01(float s) { return fminf(fmaxf(s, 0.0f), 1.0f); }
 
 DECANT_DEVICE Clearance revolved_clearance(const Edge* edges, int count, Float3 x) {
-  const float r = sqrtf(x.x * x.x + x.y * x.y), z = x.z;
+  const Radius axis = radius(x.x * x.x + x.y * x.y);
+  const float r = axis.r, z = x.z;
   float best = 3.0e38f, away_r = 0.0f, away_z = 0.0f, face_r = 0.0f, face_z = 0.0f;
   bool inside = false;
   for (int k = 0; k < count; ++k) {
     const Edge e = edges[k];
-    const float er = e.r1 - e.r0, ez = e.z1 - e.z0;
     const float pr = r - e.r0, pz = z - e.z0;
-    const float s = clamp01((pr * er + pz * ez) / (er * er + ez * ez));
-    const float ar = pr - s * er, az = pz - s * ez;
+    const float s = clamp01((pr * e.dr + pz * e.dz) * e.inverse_length2);
+    const float ar = pr - s * e.dr, az = pz - s * e.dz;
     const float squared = ar * ar + az * az;
     if (squared < best) {
       best = squared;
       away_r = ar;
       away_z = az;
-      face_r = ez;  // the solid is on the left, so outward is right
-      face_z = -er;
+      face_r = e.dz;  // the solid is on the left, so outward is right
+      face_z = -e.dr;
     }
     // Even–odd count of the outline beyond r at this height.
-    if ((e.z0 > z) != (e.z1 > z) && r < e.r0 + pz / ez * er) inside = !inside;
+    if ((e.z0 > z) != (e.z1 > z) && pr < pz * e.slope) inside = !inside;
   }
-  const float d = sqrtf(best), sign = inside ? -1.0f : 1.0f;
+  const Radius away = radius(best);
+  const float d = away.r, sign = inside ? -1.0f : 1.0f;
   float nr, nz;
   if (d > 1e-6f * (r + fabsf(z))) {
-    nr = sign * away_r / d;
-    nz = sign * away_z / d;
+    nr = sign * away_r * away.inverse;
+    nz = sign * away_z * away.inverse;
   } else {
-    const float length = sqrtf(face_r * face_r + face_z * face_z);
-    nr = face_r / length;
-    nz = face_z / length;
+    const float inverse = radius(face_r * face_r + face_z * face_z).inverse;
+    nr = face_r * inverse;
+    nz = face_z * inverse;
   }
-  const float cosine = r > 0.0f ? x.x / r : 1.0f, sine = r > 0.0f ? x.y / r : 0.0f;
+  const float cosine = r > 0.0f ? x.x * axis.inverse : 1.0f;
+  const float sine = r > 0.0f ? x.y * axis.inverse : 0.0f;
   return {sign * d, {nr * cosine, nr * sine, nz}};
 }
 
@@ -134,6 +136,31 @@ DECANT_DEVICE void collide(const Constants& c, const DeviceGeometry& g, const De
   }
   if (c.has_floor && x.z - c.floor_height < reach)
     respond(c, {0, 0, 1}, x.z - c.floor_height, nullptr, x, v);
+}
+
+/// A distance from x within which there is no solid, at least; near a solid, what its outline says.
+DECANT_DEVICE float clearance(const Constants& c, const DeviceGeometry& g, const DevicePose* poses,
+                              Float3 x) {
+  float least = 3.0e38f;
+  for (int k = 0; k < g.containers; ++k) {
+    const Shape shape = g.shapes[k];
+    // A solid without end along a periodic axis is everywhere on it.
+    if (c.any_periodic) return 0.0f;
+    const Float3 at = rotate_back(poses[k], x - poses[k].translation);
+    const Float3 off{fmaxf(fmaxf(shape.low.x - at.x, at.x - shape.high.x), 0.0f),
+                     fmaxf(fmaxf(shape.low.y - at.y, at.y - shape.high.y), 0.0f),
+                     fmaxf(fmaxf(shape.low.z - at.z, at.z - shape.high.z), 0.0f)};
+    const float away = sqrtf(dot(off, off));
+    if (away > 0.0f) {
+      least = fminf(least, away);
+      continue;
+    }
+    const Clearance near = shape.revolved
+                               ? revolved_clearance(g.edges + shape.first_edge, shape.edges, at)
+                               : box_clearance(g, shape, at);
+    least = fminf(least, fmaxf(near.distance, 0.0f));
+  }
+  return least;
 }
 
 }  // namespace decant::gpu::DECANT_EXECUTOR

@@ -30,6 +30,9 @@ Constants make_constants(const Scene& scene) {
       c.kernel = KernelId::cubic_spline;
       c.w_norm = static_cast<float>(1.0 / (pi * h3));
       c.g_norm = static_cast<float>(1.0 / (pi * h5));
+      c.g_near[0] = static_cast<float>(3.0 / (pi * h5));
+      c.g_near[1] = static_cast<float>(2.25 / (pi * h5));
+      c.g_far = static_cast<float>(0.75 * h / (pi * h5));
       break;
     case KernelFamily::wendland_c2:
       c.kernel = KernelId::wendland_c2;
@@ -87,8 +90,11 @@ Geometry make_geometry(const Scene& scene) {
     if (const auto* revolved = std::get_if<RevolvedShape>(&container.shape)) {
       shape.revolved = true;
       for (const ProfileEdge& e : surface_edges(*revolved)) {
+        const double dr = e.r1 - e.r0, dz = e.z1 - e.z0;
         g.edges.push_back({static_cast<float>(e.r0), static_cast<float>(e.z0),
-                           static_cast<float>(e.r1), static_cast<float>(e.z1)});
+                           static_cast<float>(dr), static_cast<float>(dz),
+                           static_cast<float>(e.z1), static_cast<float>(1 / (dr * dr + dz * dz)),
+                           dz != 0 ? static_cast<float>(dr / dz) : 0.0f});
         const double r = std::max(e.r0, e.r1);
         low = low.cwiseMin(Vec3(-r, -r, std::min(e.z0, e.z1)));
         high = high.cwiseMax(Vec3(r, r, std::max(e.z0, e.z1)));

@@ -24,6 +24,7 @@ struct Constants {
   KernelId kernel;
   float H, H2, inverse_h, h2_soft;  // m, m², 1/m, 0.01 h² in m²
   float w_norm, g_norm;             // of W (mueller2003: of poly6) and of G (spiky)
+  float g_near[2], g_far;           // cubic_spline's G: g_near[0] − g_near[1] q, g_far (2 − q)²/r
   float mass, rest_density, inverse_rest_density;
   float stiffness;                  // B, Pa
   int eos_exponent;                 // 7 or 1
@@ -39,8 +40,11 @@ struct Constants {
 };
 
 /// Edge of a revolved outline in (r, z), solid on the left.
-struct Edge {
-  float r0, z0, r1, z1;
+struct alignas(16) Edge {
+  float r0, z0, dr, dz;       // from its start to its end
+  float z1;
+  float inverse_length2;      // 1/(dr² + dz²)
+  float slope;                // dr/dz; 0 where dz is
 };
 
 struct Box {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "gpu/device_scene.hpp"
+#include "gpu/options.hpp"
 #include "oracle/backend.hpp"
 
 #include <cstdint>
@@ -45,16 +46,24 @@ class DeviceSolver {
   virtual Status advance(int substeps, const std::vector<DevicePose>& poses) = 0;
   virtual void read(std::vector<float>& position, std::vector<float>& velocity) const = 0;
   virtual StageTimes stage_times() const = 0;
+  /// How often neighbors were looked for anew, since `load`.
+  virtual std::int64_t rebuilds() const = 0;
+  /// Device memory held.
+  virtual std::size_t device_bytes() const = 0;
 };
 
 /// Factories of one executor, and what it runs on.
 namespace host {
-std::unique_ptr<DeviceSolver> make_brute();
+std::unique_ptr<DeviceSolver> make_brute(const SolverOptions& options);
+std::unique_ptr<DeviceSolver> make_hash(const SolverOptions& options);
+std::unique_ptr<DeviceSolver> make_list(const SolverOptions& options);
 std::string device();
 std::string thrust_version();
 }  // namespace host
 namespace cuda {
-std::unique_ptr<DeviceSolver> make_brute();
+std::unique_ptr<DeviceSolver> make_brute(const SolverOptions& options);
+std::unique_ptr<DeviceSolver> make_hash(const SolverOptions& options);
+std::unique_ptr<DeviceSolver> make_list(const SolverOptions& options);
 /// Empty where no device can be used; `why_not` says why.
 std::string device(std::string* why_not);
 }  // namespace cuda

@@ -1,204 +1,194 @@
 /// \file
 /// The stages of a substep as one functor each. Those that sum over neighbors are templates on a
 /// query, the only thing in which backends differ:
-///   query.fluid(team, x_i, visit)          visit(j, d, r2) for every fluid j with r < H, i included
-///   query.wall(team, x_i, visit)           the same for wall particles in the world
-///   query.wall_frame(team, x_b, visit)     the same for wall particles in their own frames
-/// with d = x_i − x_j by the nearest image and r2 = |d|². A visit may come on any lane of the team.
+///   query.each(team, i, x, points, visit)  visit(j, point_j, d, r2) for every particle j with r < H
+///                                          except i, fluid (j < Arrays::base) and wall; point_j is
+///                                          points[j], d = x − x_j by the nearest image, r2 = |d|²
+///   query.weight(j, point_j)               density pass: m, or ρ0 V_j of a wall particle
+///   query.pressure_term(j, point_j)        force pass: p/ρ² of j; 0 of a wall particle
+/// A visit may come on any lane of the team, and also for pairs farther than H: kernels are 0 there, and
+/// branches cost more than zeros.
 #pragma once
 
-#include "gpu/contact.cuh"
+#include "gpu/walls.cuh"
 
 namespace decant::gpu::DECANT_EXECUTOR {
 
-/// Device arrays of one scene. Fluid and wall positions are padded to whole tiles with points that
-/// are far from everything.
-struct Arrays {
-  int n, m;                  // fluid, wall particles
-  float4 *position, *velocity;          // xyz and |x|²; xyz
-  float *density, *pressure;
-  float2* thermo;                       // p/rho², 1/rho, what neighbors read
-  float4 *pressure_acceleration, *viscous_acceleration, *wall_pressure_acceleration,
-      *wall_viscous_acceleration, *acceleration;
-  long long *fluid_count, *fluid_id_sum, *wall_count, *wall_id_sum;
-  float4* wall_local;                   // xyz and |x|² in the container's frame
-  float4* wall;                         // xyz and |x|² in the world
-  float4* wall_velocity;
-  float* wall_volume;                   // V_b
-  int* wall_container;
-  unsigned long long* trouble;          // [0] non-finite, [1] escaped: (substep << 32) | particle
-};
-
-DECANT_DEVICE bool is_finite(Float3 v) {
-  return fabsf(v.x) <= 3.0e38f && fabsf(v.y) <= 3.0e38f && fabsf(v.z) <= 3.0e38f;
-}
-
-DECANT_DEVICE void report(unsigned long long* word, unsigned substep, int particle) {
-  atomic_minimum(word, (static_cast<unsigned long long>(substep) << 32) |
-                           static_cast<unsigned>(particle));
-}
-
-/// Wall particles [first, first + count) to their place in the world at one time.
-struct PosePass {
-  Arrays a;
-  const DevicePose* poses;  // one a container
-  int first;
-
-  DECANT_DEVICE void operator()(int k) const {
-    const int b = first + k;
-    const DevicePose& pose = poses[a.wall_container[b]];
-    const Float3 x = rotate(pose, xyz(a.wall_local[b])) + pose.translation;
-    const Float3 v = cross(pose.omega, x - pose.pivot);
-    a.wall[b] = point_at(x);
-    a.wall_velocity[b] = make_float4(v.x, v.y, v.z, 0.0f);
-  }
-};
-
-/// V_b = 1 / Σ_k W_bk over the wall particles of the same container, itself included.
-template <class Query>
-struct VolumePass {
-  Constants c;
-  Arrays a;
-  Query query;
-
-  template <class Team>
-  DECANT_DEVICE void operator()(Team& team, int b, bool active) const {
-    const int container = a.wall_container[b];
-    float sum = 0.0f;
-    query.wall_frame(team, xyz(a.wall_local[b]), [&](int k, Float3, float r2) {
-      if (a.wall_container[k] == container) sum += kernel_w(c, sqrtf(r2));
-    });
-    sum = team.sum(sum);
-    if (active && team.leads()) a.wall_volume[b] = 1.0f / sum;
-  }
-};
-
-/// Density, pressure and the neighbor facts of every fluid particle.
-template <class Query>
+/// Density, pressure and what neighbors read of them; with `facts` also what `evaluate` tells.
+template <class Query, bool facts>
 struct DensityPass {
   Constants c;
   Arrays a;
   Query query;
+  FieldArrays out;
+  const int* wall_id;
 
   template <class Team>
   DECANT_DEVICE void operator()(Team& team, int i, bool active) const {
-    const Float3 x = xyz(a.position[i]);
-    float fluid = 0.0f, wall = 0.0f;
+    const float4 own = a.now.position[i];
+    const Float3 x = xyz(own);
+    // The particle itself is counted once.
+    float sum = team.leads() ? c.mass * kernel_w(c, {0.0f, 0.0f}) : 0.0f;
     int fluid_count = 0, wall_count = 0;
     long long fluid_ids = 0, wall_ids = 0;
-    query.fluid(team, x, [&](int j, Float3, float r2) {
-      fluid += kernel_w(c, sqrtf(r2));
-      if (j == i) return;
-      ++fluid_count;
-      fluid_ids += j;
+    query.each(team, i, x, a.now.position, [&](int j, float4 other, Float3, float r2) DECANT_INLINE {
+      sum += query.weight(j, other) * kernel_w(c, radius(r2));
+      if constexpr (facts) {
+        if (!(r2 < c.H2)) return;
+        if (j < a.base) {
+          ++fluid_count;
+          fluid_ids += a.id[j];
+        } else {
+          ++wall_count;
+          wall_ids += wall_id[j - a.base];
+        }
+      }
     });
-    query.wall(team, x, [&](int b, Float3, float r2) {
-      wall += a.wall_volume[b] * kernel_w(c, sqrtf(r2));
-      ++wall_count;
-      wall_ids += b;
-    });
-    fluid = team.sum(fluid);
-    wall = team.sum(wall);
-    fluid_count = team.sum(fluid_count);
-    wall_count = team.sum(wall_count);
-    fluid_ids = team.sum(fluid_ids);
-    wall_ids = team.sum(wall_ids);
+    const float density = team.sum(sum);
+    if constexpr (facts) {
+      fluid_count = team.sum(fluid_count);
+      fluid_ids = team.sum(fluid_ids);
+      wall_count = team.sum(wall_count);
+      wall_ids = team.sum(wall_ids);
+    }
     if (!active || !team.leads()) return;
-    const float density = c.mass * fluid + c.rest_density * wall;
     const float p = pressure_at(c, density);
-    a.density[i] = density;
-    a.pressure[i] = p;
-    a.thermo[i] = make_float2(p / (density * density), 1.0f / density);
-    a.fluid_count[i] = fluid_count;
-    a.fluid_id_sum[i] = fluid_ids;
-    a.wall_count[i] = wall_count;
-    a.wall_id_sum[i] = wall_ids;
+    const float4 v = a.now.velocity[i];
+    a.point[i] = make_float4(x.x, x.y, x.z, p / (density * density));
+    a.motion[i] = make_float4(v.x, v.y, v.z, 1.0f / density);
+    if constexpr (facts) {
+      const int id = a.id[i];
+      out.density[id] = density;
+      out.pressure[id] = p;
+      out.fluid_count[id] = fluid_count;
+      out.fluid_id_sum[id] = fluid_ids;
+      out.wall_count[id] = wall_count;
+      out.wall_id_sum[id] = wall_ids;
+    }
   }
 };
 
-/// What neighbors read, from density and pressure given from outside.
-struct ThermoPass {
+/// What neighbors read, from density and pressure given from outside, by id.
+struct GivenPass {
   Arrays a;
   const float *density, *pressure;
 
   DECANT_DEVICE void operator()(int i) const {
-    a.thermo[i] = make_float2(pressure[i] / (density[i] * density[i]), 1.0f / density[i]);
+    const int id = a.id[i];
+    a.point[i].w = pressure[id] / (density[id] * density[id]);
+    a.motion[i].w = 1.0f / density[id];
   }
 };
 
-/// The four parts of the acceleration and their sum with gravity.
-template <class Query>
+/// Acceleration, all that `advance` needs; with `facts` its parts, by id. With w_j = m and ν_j = μ m/ρ_j
+/// of fluid, w_b = ρ0 V_b and ν_b = μ_w V_b of a wall particle, both are
+/// Σ w_j (p_i/ρ_i² + p_j/ρ_j²) G x_ij + (1/ρ_i) Σ ν_j (v_j − v_i) L.
+template <class Query, bool facts>
 struct ForcePass {
   Constants c;
   Arrays a;
   Query query;
-  unsigned substep;
+  FieldArrays out;
 
   template <class Team>
   DECANT_DEVICE void operator()(Team& team, int i, bool active) const {
-    const Float3 x = xyz(a.position[i]), v = xyz(a.velocity[i]);
-    const float q = a.thermo[i].x, inverse_density = a.thermo[i].y;
+    const float4 point = a.point[i], motion = a.motion[i];
+    const Float3 x = xyz(point), v = xyz(motion);
+    const float q = point.w, inverse_density = motion.w;
+    const float fluid_viscosity = c.viscosity * c.mass;
     Float3 pressure{0, 0, 0}, viscous{0, 0, 0}, wall_pressure{0, 0, 0}, wall_viscous{0, 0, 0};
-    query.fluid(team, x, [&](int j, Float3 d, float r2) {
-      const float r = sqrtf(r2), g = kernel_g(c, r);
-      const float2 other = a.thermo[j];
-      pressure = pressure + ((q + other.x) * g) * d;
-      viscous = viscous + (other.y * kernel_l(c, r, g)) * (xyz(a.velocity[j]) - v);
+    query.each(team, i, x, a.point, [&](int j, float4 other, Float3 d, float r2) DECANT_INLINE {
+      const Radius r = radius(r2);
+      const float g = kernel_g(c, r);
+      const float4 moves = read_only(a.motion + j);
+      const bool wall = j >= a.base;
+      const float weight = wall ? c.rest_density * moves.w : c.mass;
+      const float drag = moves.w * (wall ? c.wall_viscosity : fluid_viscosity);
+      const Float3 push = (weight * (q + query.pressure_term(j, other)) * g) * d;
+      const Float3 pull = (drag * kernel_l(c, r, r2, g)) * (xyz(moves) - v);
+      if constexpr (facts) {
+        if (wall) {
+          wall_pressure = wall_pressure + push;
+          wall_viscous = wall_viscous + pull;
+          return;
+        }
+      }
+      pressure = pressure + push;
+      viscous = viscous + pull;
     });
-    query.wall(team, x, [&](int b, Float3 d, float r2) {
-      const float r = sqrtf(r2), g = kernel_g(c, r), volume = a.wall_volume[b];
-      wall_pressure = wall_pressure + (volume * g) * d;
-      wall_viscous = wall_viscous + (volume * kernel_l(c, r, g)) * (xyz(a.wall_velocity[b]) - v);
-    });
-    const Float3 p = c.mass * total(team, pressure);
-    const Float3 f = (c.viscosity * inverse_density * c.mass) * total(team, viscous);
-    const Float3 wp = (c.rest_density * q) * total(team, wall_pressure);
-    const Float3 wf = (c.wall_viscosity * inverse_density) * total(team, wall_viscous);
-    if (!active || !team.leads()) return;
-    const Float3 sum = (p + wp) + (f + wf) + c.gravity;
-    if (!is_finite(sum)) report(a.trouble, substep, i);
-    a.pressure_acceleration[i] = make_float4(p.x, p.y, p.z, 0.0f);
-    a.viscous_acceleration[i] = make_float4(f.x, f.y, f.z, 0.0f);
-    a.wall_pressure_acceleration[i] = make_float4(wp.x, wp.y, wp.z, 0.0f);
-    a.wall_viscous_acceleration[i] = make_float4(wf.x, wf.y, wf.z, 0.0f);
-    a.acceleration[i] = make_float4(sum.x, sum.y, sum.z, 0.0f);
+    viscous = inverse_density * viscous;
+    if constexpr (facts) {
+      pressure = total(team, pressure);
+      viscous = total(team, viscous);
+      wall_pressure = total(team, wall_pressure);
+      wall_viscous = total(team, inverse_density * wall_viscous);
+      if (!active || !team.leads()) return;
+      const Float3 sum = (pressure + wall_pressure) + (viscous + wall_viscous) + c.gravity;
+      const int id = a.id[i];
+      // A position that is no number is nobody's neighbor, and falls as if it were alone.
+      if (!is_finite(sum) || !is_finite(x)) report(&a.mailbox->non_finite, 0, id);
+      tell(out.pressure_acceleration, id, pressure);
+      tell(out.viscous_acceleration, id, viscous);
+      tell(out.wall_pressure_acceleration, id, wall_pressure);
+      tell(out.wall_viscous_acceleration, id, wall_viscous);
+      tell(out.acceleration, id, sum);
+    } else {
+      const Float3 sum = total(team, pressure + viscous) + c.gravity;
+      if (active && team.leads()) a.acceleration[i] = make_float4(sum.x, sum.y, sum.z, 0.0f);
+    }
   }
 
  private:
+  DECANT_DEVICE static void tell(float* to, int id, Float3 v) {
+    const auto k = 3 * static_cast<std::size_t>(id);
+    to[k] = v.x;
+    to[k + 1] = v.y;
+    to[k + 2] = v.z;
+  }
   template <class Team>
   DECANT_DEVICE static Float3 total(const Team& team, Float3 v) {
     return {team.sum(v.x), team.sum(v.y), team.sum(v.z)};
   }
 };
 
-/// Semi-implicit Euler, periodic wrap, contact at the end of the substep, checks.
+struct Nothing {
+  DECANT_DEVICE void operator()(int, Float3) const {}
+};
+
+/// Semi-implicit Euler, periodic wrap, contact at the end of the substep, checks. `after`(i, x) sees
+/// the new position. A pass of its own: contact wants one thread a particle where forces want several.
+/// Threads after the particles' place moving walls at the end of the substep.
+template <class After>
 struct IntegratePass {
   Constants c;
   Arrays a;
   DeviceGeometry geometry;
-  const DevicePose* poses;  // at the end of the substep
-  unsigned substep;         // counted from 1 within this advance
+  PosePass moving;
+  After after;
 
-  DECANT_DEVICE static float wrap(const Constants& c, int axis, float x) {
+  DECANT_DEVICE void operator()(int i) const {
+    if (i >= a.n) return moving(i - a.n);
+    Float3 x = xyz(a.point[i]), v = xyz(a.motion[i]);
+    v = v + c.dt * xyz(a.acceleration[i]);
+    x = x + c.dt * v;
+    x = {wrap(0, x.x), wrap(1, x.y), wrap(2, x.z)};
+    collide(c, geometry, a.poses_at_end(), x, v);
+    if (!is_finite(x) || !is_finite(v))
+      report(&a.mailbox->non_finite, a.mailbox->substep, a.id[i]);
+    else if (escaped(0, x.x) || escaped(1, x.y) || escaped(2, x.z))
+      report(&a.mailbox->escaped, a.mailbox->substep, a.id[i]);
+    a.next.position[i] = point_at(x);
+    a.next.velocity[i] = make_float4(v.x, v.y, v.z, 0.0f);
+    after(i, x);
+  }
+
+ private:
+  DECANT_DEVICE float wrap(int axis, float x) const {
     if (!c.periodic[axis]) return x;
     return x - c.period[axis] * floorf((x - c.domain_min[axis]) * c.inverse_period[axis]);
   }
   DECANT_DEVICE bool escaped(int axis, float x) const {
     return !c.periodic[axis] && !(x >= c.domain_min[axis] && x <= c.domain_max[axis]);
-  }
-
-  DECANT_DEVICE void operator()(int i) const {
-    Float3 x = xyz(a.position[i]), v = xyz(a.velocity[i]);
-    v = v + c.dt * xyz(a.acceleration[i]);
-    x = x + c.dt * v;
-    x = {wrap(c, 0, x.x), wrap(c, 1, x.y), wrap(c, 2, x.z)};
-    collide(c, geometry, poses, x, v);
-    if (!is_finite(x) || !is_finite(v))
-      report(a.trouble, substep, i);
-    else if (escaped(0, x.x) || escaped(1, x.y) || escaped(2, x.z))
-      report(a.trouble + 1, substep, i);
-    a.position[i] = point_at(x);
-    a.velocity[i] = make_float4(v.x, v.y, v.z, 0.0f);
   }
 };
 

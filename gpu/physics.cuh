@@ -21,42 +21,64 @@ DECANT_DEVICE Float3 xyz(float4 v) { return {v.x, v.y, v.z}; }
 /// A point as queries read it: x, y, z and |x|².
 DECANT_DEVICE float4 point_at(Float3 x) { return make_float4(x.x, x.y, x.z, dot(x, x)); }
 
-/// W(r), 1/m³, for r < H.
-DECANT_DEVICE float kernel_w(const Constants& c, float r) {
-  const float q = r * c.inverse_h;
+/// r and 1/r from r²; no branch, no call. At r = 0 the inverse is huge and finite.
+struct Radius {
+  float r, inverse;
+};
+DECANT_DEVICE Radius radius(float r2) {
+#ifdef __CUDACC__
+  const float y = rsqrtf(fmaxf(r2, 1e-30f)), r = r2 * y;
+  // One step of Newton's: the approximation's two last bits would be the largest error of a term.
+  return {fmaf(fmaf(-r, r, r2), 0.5f * y, r), y};
+#else
+  const float r = sqrtf(r2);
+  return {r, 1.0f / (r > 1e-15f ? r : 1e-15f)};
+#endif
+}
+DECANT_DEVICE float quotient(float a, float b) {
+#ifdef __CUDACC__
+  return __fdividef(a, b);  // b is far from the ends of fp32's range
+#else
+  return a / b;
+#endif
+}
+DECANT_DEVICE float positive(float s) { return s > 0.0f ? s : 0.0f; }
+
+/// W(r), 1/m³; 0 from H on.
+DECANT_DEVICE float kernel_w(const Constants& c, Radius d) {
+  const float q = d.r * c.inverse_h;
   if (c.kernel == KernelId::cubic_spline) {
-    if (q < 1.0f) return c.w_norm * (1.0f - q * q * (1.5f - 0.75f * q));
-    const float s = 2.0f - q;
-    return c.w_norm * 0.25f * (s * s * s);
+    const float s = positive(2.0f - q), outer = 0.25f * (s * s * s);
+    return c.w_norm * (q < 1.0f ? 1.0f - q * q * (1.5f - 0.75f * q) : outer);
   }
   if (c.kernel == KernelId::wendland_c2) {
-    const float s = 1.0f - 0.5f * q, s2 = s * s;
+    const float s = positive(1.0f - 0.5f * q), s2 = s * s;
     return c.w_norm * s2 * s2 * (1.0f + 2.0f * q);
   }
-  const float s = 1.0f - 0.25f * q * q;  // 1 − (r/H)²
+  const float s = positive(1.0f - 0.25f * q * q);  // 1 − (r/H)²
   return c.w_norm * s * s * s;
 }
 
-/// G(r), 1/m⁵, for r < H; 0 at r = 0 where it is singular.
-DECANT_DEVICE float kernel_g(const Constants& c, float r) {
-  const float q = r * c.inverse_h;
+/// G(r), 1/m⁵; 0 from H on.
+DECANT_DEVICE float kernel_g(const Constants& c, Radius d) {
+  const float q = d.r * c.inverse_h;
   if (c.kernel == KernelId::cubic_spline) {
-    if (q < 1.0f) return c.g_norm * (3.0f - 2.25f * q);
-    const float s = 2.0f - q;
-    return c.g_norm * 0.75f * s * s / q;
+    const float s = positive(2.0f - q);
+    const float far = c.g_far * d.inverse * (s * s);
+    return q < 1.0f ? c.g_near[0] - c.g_near[1] * q : far;
   }
   if (c.kernel == KernelId::wendland_c2) {
-    const float s = 1.0f - 0.5f * q;
+    const float s = positive(1.0f - 0.5f * q);
     return c.g_norm * s * s * s;
   }
-  const float s = c.H - r;
-  return r > 0.0f ? c.g_norm * s * s / r : 0.0f;
+  const float s = positive(c.H - d.r);
+  return c.g_norm * s * s * d.inverse;
 }
 
-/// L(r), 1/m⁵, from G at the same distance.
-DECANT_DEVICE float kernel_l(const Constants& c, float r, float g) {
-  if (c.kernel == KernelId::mueller2003) return c.g_norm * (c.H - r);
-  return 2.0f * r * r * g / (r * r + c.h2_soft);
+/// L(r), 1/m⁵, from G at the same distance; 0 from H on.
+DECANT_DEVICE float kernel_l(const Constants& c, Radius d, float r2, float g) {
+  if (c.kernel == KernelId::mueller2003) return c.g_norm * positive(c.H - d.r);
+  return quotient(2.0f * r2 * g, r2 + c.h2_soft);
 }
 
 /// p(rho), Pa.

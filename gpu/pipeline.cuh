@@ -1,10 +1,14 @@
 /// \file
-/// A backend from a neighbor query: owns the device arrays and runs the stages in order, the whole
-/// substep on the device. One small read-back an `advance` tells of trouble.
+/// A backend from a search: owns the device arrays and runs the stages in order, the whole substep on
+/// the device. Substeps are recorded and replayed where the search allows; one small read-back an
+/// `advance` tells of trouble.
+///
+/// A search that finds its lists too short says so in the mailbox. What was computed since is thrown
+/// away: the state before is put back, the lists grow, and the same substeps run again.
 #pragma once
 
 #include "gpu/device_solver.hpp"
-#include "gpu/passes.cuh"
+#include "gpu/search.cuh"
 #include "reference/error.hpp"
 
 #include <algorithm>
@@ -12,220 +16,357 @@
 
 namespace decant::gpu::DECANT_EXECUTOR {
 
-/// \tparam Search  names its Query for free and periodic scenes, and makes one from the arrays:
-///   template <bool periodic> using Query; template <bool periodic> Query<periodic> query(c, arrays)
+/// \tparam Search  BruteSearch shows what it must offer.
 template <class Search>
 class Pipeline : public DeviceSolver {
  public:
+  explicit Pipeline(const SolverOptions& options) : search_(options) {}
+
   void load(const Problem& problem) override {
+    loaded_ = false;  // should anything below fail
+    long_recording_.clear();
+    short_recording_.clear();
     c_ = problem.constants;
     containers_ = static_cast<int>(problem.geometry.shapes.size());
     n_ = static_cast<int>(problem.position.size() / 3);
-    m_ = static_cast<int>(problem.walls.x.size());
     shapes_.upload(problem.geometry.shapes);
     edges_.upload(problem.geometry.edges);
     boxes_.upload(problem.geometry.boxes);
     faces_.upload(problem.geometry.faces);
+    load_walls(problem.walls);
     allocate();
-    upload_rows(position_, problem.position, n_);
-    upload_rows(velocity_, problem.velocity, n_);
-    upload_walls(problem.walls);
+    state_.upload(problem.position, problem.velocity);
     times_ = {};
-    posed_still_ = false;
-    c_.any_periodic ? find_volumes<true>() : find_volumes<false>();
+    rebuilds_ = advances_ = 0;
+    search_.load(queue_, c_, arrays(), wall_store_, problem.position);
+    queue_.wait();
+    loaded_ = true;
   }
 
   Status evaluate(const std::vector<DevicePose>& poses, const GivenInputs& given,
                   HostFields& out) override {
     require_loaded();
-    poses_.upload(poses);
-    clear_trouble();
-    reset_fields();
-    const std::vector<float> own_volume = wall_volume_.download(static_cast<std::size_t>(m_));
+    upload_poses(poses);
+    std::vector<float> own_volume = wall_volume_.download(static_cast<std::size_t>(m_));
     if (!given.boundary_volume.empty()) wall_volume_.upload(given.boundary_volume);
-    c_.any_periodic ? fields<true>(0, poses_.get(), &given) : fields<false>(0, poses_.get(), &given);
+    Mailbox mail;
+    do {
+      begin();
+      FieldArrays fields = unwritten_fields();
+      with_periodic(c_, [&](auto periodic) {
+        constexpr bool p = decltype(periodic)::value;
+        const Arrays a = arrays();
+        search_.template density<p, true>(queue_, a, geometry(), fields, Laps());
+        if (!given.density.empty()) use_given(a, given);
+        search_.template force<p, true>(queue_, a, fields, Laps());
+      });
+      queue_.wait();
+      mail = mailbox_.download(1)[0];
+    } while (search_.grow(mail.longest_list));
     download_fields(out);
-    out.boundary_volume = own_volume;
     wall_volume_.upload(own_volume);
-    watch_.read();
-    return status();
+    out.boundary_volume = std::move(own_volume);
+    return status_of(mail);
   }
 
   Status advance(int substeps, const std::vector<DevicePose>& poses) override {
     require_loaded();
-    poses_.upload(poses);
-    clear_trouble();
-    for (int k = 0; k < substeps; ++k) {
-      const DevicePose* now = poses_.get() + static_cast<std::ptrdiff_t>(k) * containers_;
-      const auto substep = static_cast<unsigned>(k + 1);
-      c_.any_periodic ? fields<true>(substep, now, nullptr) : fields<false>(substep, now, nullptr);
-      for_each(n_, IntegratePass{c_, arrays(), geometry(), now + containers_, substep});
-      watch_.lap(times_.integrate);
-      // Events are many; reading them now and then keeps their number small.
-      if (k % 64 == 63) watch_.read();
+    upload_poses(poses);
+    save();
+    Mailbox mail;
+    for (;;) {
+      begin();
+      run(substeps);
+      queue_.wait();
+      mail = mailbox_.download(1)[0];
+      if (!search_.grow(mail.longest_list)) break;
+      // Recordings know where the lists were.
+      long_recording_.clear();
+      short_recording_.clear();
+      put_back();
     }
-    const Status result = status();
     watch_.read();
-    return result;
+    rebuilds_ += mail.rebuilds;
+    return status_of(mail);
   }
 
   void read(std::vector<float>& position, std::vector<float>& velocity) const override {
-    position = download_rows(position_, n_);
-    velocity = download_rows(velocity_, n_);
+    const auto n = static_cast<std::size_t>(n_);
+    const std::vector<int> id = state_.id.download(n);
+    position = by_id(state_.position.download(n), id);
+    velocity = by_id(state_.velocity.download(n), id);
   }
 
   StageTimes stage_times() const override { return times_; }
+  std::int64_t rebuilds() const override { return rebuilds_; }
+
+  std::size_t device_bytes() const override {
+    return state_.bytes() + spare_position_.bytes() + spare_velocity_.bytes() + point_.bytes() +
+           motion_.bytes() + desk_.bytes() + wall_local_.bytes() + wall_id_.bytes() +
+           wall_container_.bytes() + wall_volume_.bytes() + search_.bytes();
+  }
 
  private:
+  // Substeps of the long recording: launching it is then cheap beside running it.
+  static constexpr int long_run = 16;
+
+  struct State {
+    Buffer<float4> position, velocity;
+    Buffer<int> id;
+
+    std::size_t bytes() const { return position.bytes() + velocity.bytes() + id.bytes(); }
+    void upload(const std::vector<float>& x, const std::vector<float>& v) {
+      upload_rows(position, x);
+      upload_rows(velocity, v);
+      std::vector<int> ids(id.size());
+      for (std::size_t i = 0; i < ids.size(); ++i) ids[i] = static_cast<int>(i);
+      id.upload(ids);
+    }
+  };
+
   void require_loaded() const {
-    if (n_ < 0) throw BackendError("nothing is loaded");
+    if (!loaded_) throw BackendError("nothing is loaded");
   }
 
   void allocate() {
-    const auto n = static_cast<std::size_t>(n_), m = static_cast<std::size_t>(m_);
-    position_.resize(static_cast<std::size_t>(padded(n_)));
-    velocity_.resize(n);
-    thermo_.resize(n);
-    reset_fields();
-    wall_local_.resize(static_cast<std::size_t>(padded(m_)));
-    wall_.resize(static_cast<std::size_t>(padded(m_)));
-    wall_velocity_.resize(m);
-    wall_volume_.resize(m);
-    wall_container_.resize(m);
-    trouble_.resize(2);
-  }
-
-  /// What no pass writes after this reads as NaN or −1.
-  void reset_fields() {
     const auto n = static_cast<std::size_t>(n_);
-    density_.resize(n);
-    pressure_.resize(n);
-    for (auto* b : {&pressure_acceleration_, &viscous_acceleration_, &wall_pressure_acceleration_,
-                    &wall_viscous_acceleration_, &acceleration_})
-      b->resize(n);
-    for (auto* b : {&fluid_count_, &fluid_id_sum_, &wall_count_, &wall_id_sum_}) b->resize(n);
+    const auto all = static_cast<std::size_t>(padded(n_) + wall_store_.padded_total());
+    state_.position.resize(all);
+    state_.velocity.resize(n);
+    state_.id.resize(n);
+    spare_position_.resize(all);
+    spare_velocity_.resize(n);
+    point_.resize(all);
+    motion_.resize(all);
+    desk_.resize(n * desk_bytes);
+    mailbox_.resize(1);
   }
 
   /// Padding is nowhere: no comparison with NaN holds, so it is nobody's neighbor.
   static constexpr float nowhere = std::numeric_limits<float>::quiet_NaN();
 
-  static void upload_rows(Buffer<float4>& to, const std::vector<float>& rows, int count) {
+  static void upload_rows(Buffer<float4>& to, const std::vector<float>& rows) {
     std::vector<float4> points(to.size(), make_float4(nowhere, nowhere, nowhere, 0.0f));
-    for (int i = 0; i < count; ++i) {
-      const auto k = 3 * static_cast<std::size_t>(i);
-      const float x = rows[k], y = rows[k + 1], z = rows[k + 2];
-      points[static_cast<std::size_t>(i)] = make_float4(x, y, z, x * x + y * y + z * z);
+    for (std::size_t i = 0; 3 * i + 2 < rows.size(); ++i) {
+      const float x = rows[3 * i], y = rows[3 * i + 1], z = rows[3 * i + 2];
+      points[i] = make_float4(x, y, z, x * x + y * y + z * z);
     }
     to.upload(points);
   }
 
-  static std::vector<float> download_rows(const Buffer<float4>& from, int count) {
-    const auto points = from.download(static_cast<std::size_t>(count));
-    std::vector<float> rows;
-    rows.reserve(3 * points.size());
-    for (const float4& p : points) rows.insert(rows.end(), {p.x, p.y, p.z});
+  static std::vector<float> by_id(const std::vector<float4>& points, const std::vector<int>& id) {
+    std::vector<float> rows(3 * points.size(), nowhere);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const auto k = 3 * static_cast<std::size_t>(id[i]);
+      if (k + 2 >= rows.size()) throw BackendError("an id out of range came back");
+      rows[k] = points[i].x;
+      rows[k + 1] = points[i].y;
+      rows[k + 2] = points[i].z;
+    }
     return rows;
   }
 
-  void upload_walls(const WallSamples& walls) {
+  void load_walls(const WallSamples& walls) {
     std::vector<float> rows;
-    std::vector<int> container;
-    first_moving_ = m_;
-    moving_end_ = m_;
+    std::vector<int> ids, containers;
+    wall_store_ = {};
+    bool any_moves = false;
     for (std::size_t c = 0; c + 1 < walls.container_begin.size(); ++c) {
-      if (walls.container_moves[c]) first_moving_ = std::min(first_moving_, walls.container_begin[c]);
+      WallSegment s{};
+      s.begin = static_cast<int>(ids.size());
+      float low[3] = {0, 0, 0}, high[3] = {0, 0, 0};
       for (int b = walls.container_begin[c]; b < walls.container_begin[c + 1]; ++b) {
         const auto k = static_cast<std::size_t>(b);
-        rows.insert(rows.end(), {walls.x[k], walls.y[k], walls.z[k]});
-        container.push_back(static_cast<int>(c));
+        const float x[3] = {walls.x[k], walls.y[k], walls.z[k]};
+        for (int a = 0; a < 3; ++a) {
+          low[a] = b == walls.container_begin[c] ? x[a] : std::min(low[a], x[a]);
+          high[a] = b == walls.container_begin[c] ? x[a] : std::max(high[a], x[a]);
+        }
+        rows.insert(rows.end(), {x[0], x[1], x[2]});
+        ids.push_back(b);
       }
-      if (walls.container_moves[c]) moving_end_ = walls.container_begin[c + 1];
+      s.end = static_cast<int>(ids.size());
+      s.low = {low[0], low[1], low[2]};
+      s.high = {high[0], high[1], high[2]};
+      const auto whole = static_cast<std::size_t>(padded(s.end));
+      rows.resize(3 * whole, nowhere);
+      ids.resize(whole, -1);
+      containers.resize(whole, static_cast<int>(c));
+      if (walls.container_moves[c]) {
+        if (!any_moves) wall_store_.first_moving = s.begin;
+        any_moves = true;
+        wall_store_.moving_end = s.end;
+      }
+      wall_store_.segments.push_back(s);
+      wall_store_.moves.push_back(walls.container_moves[c]);
     }
-    upload_rows(wall_local_, rows, m_);
-    upload_rows(wall_, rows, m_);
-    wall_container_.upload(container);
+    m_ = static_cast<int>(walls.x.size());
+    wall_local_.resize(ids.size());
+    upload_rows(wall_local_, rows);
+    wall_id_.upload(ids);
+    wall_container_.upload(containers);
+    wall_volume_.resize(static_cast<std::size_t>(m_));
+    wall_store_.local = wall_local_.get();
+    wall_store_.volume = wall_volume_.get();
+    wall_store_.walls = {wall_local_.get(), wall_id_.get(), wall_container_.get(),
+                         wall_volume_.get(), Search::points_carry_square};
   }
 
-  Arrays arrays() const {
-    return {n_, m_, position_.get(), velocity_.get(), density_.get(), pressure_.get(),
-            thermo_.get(), pressure_acceleration_.get(), viscous_acceleration_.get(),
-            wall_pressure_acceleration_.get(), wall_viscous_acceleration_.get(),
-            acceleration_.get(), fluid_count_.get(), fluid_id_sum_.get(), wall_count_.get(),
-            wall_id_sum_.get(), wall_local_.get(), wall_.get(), wall_velocity_.get(),
-            wall_volume_.get(), wall_container_.get(), trouble_.get()};
+  void upload_poses(const std::vector<DevicePose>& poses) {
+    if (poses.size() > poses_.size()) {
+      long_recording_.clear();
+      short_recording_.clear();
+      poses_.resize(2 * poses.size());
+    }
+    poses_.upload(poses);
+  }
+
+  Arrays arrays() {
+    Arrays a{};
+    a.n = n_;
+    a.base = padded(n_);
+    a.id = state_.id.get();
+    a.point = point_.get();
+    a.motion = motion_.get();
+    a.mailbox = mailbox_.get();
+    a.poses = poses_.get();
+    a.containers = containers_;
+    a.acceleration = spare_position_.get();
+    search_.arrange(a, {state_.position.get(), state_.velocity.get()},
+                    {spare_position_.get(), spare_velocity_.get()});
+    return a;
   }
 
   DeviceGeometry geometry() const {
     return {containers_, shapes_.get(), edges_.get(), boxes_.get(), faces_.get()};
   }
 
-  template <bool periodic>
-  void find_volumes() {
-    using Query = typename Search::template Query<periodic>;
-    const Query query = search_.template query<periodic>(c_, arrays());
-    for_each_team(m_, VolumePass<Query>{c_, arrays(), query});
+  /// No substep yet, nothing found, walls in place, and neighbors to be looked for.
+  void begin() {
+    mailbox_.upload({Mailbox{~0ull, ~0ull, 0, 0, 0, 1, 0.0f, 0}});
+    const Arrays a = arrays();
+    queue_.for_each(wall_store_.padded_total(), PosePass{a, wall_store_.walls, 0, true});
+    search_.begin(queue_, a);
   }
 
-  /// Walls, density, pressure and accelerations at one time. Containers at rest are posed once.
-  template <bool periodic>
-  void fields(unsigned substep, const DevicePose* poses, const GivenInputs* given) {
-    using Query = typename Search::template Query<periodic>;
-    watch_.start();
-    if (!posed_still_)
-      for_each(m_, PosePass{arrays(), poses, 0});
-    else
-      for_each(moving_end_ - first_moving_, PosePass{arrays(), poses, first_moving_});
-    posed_still_ = true;
-    const Query query = search_.template query<periodic>(c_, arrays());
-    watch_.lap(times_.build);
-    for_each_team(n_, DensityPass<Query>{c_, arrays(), query});
-    watch_.lap(times_.density);
-    if (given && !(given->density.empty() && given->pressure.empty())) use_given(*given);
-    for_each_team(n_, ForcePass<Query>{c_, arrays(), query, substep});
-    watch_.lap(times_.force);
+  /// Now and then the first substep is timed stage by stage and so is the second, which shares a list
+  /// with the first; the others are replayed.
+  void run(int substeps) {
+    int done = 0;
+    const int sample = advances_++ % 8 == 0 ? 2 : 0;
+    const int timed = search_.capturable() ? std::min(substeps, sample) : substeps;
+    for (; done < timed; ++done) {
+      substep(Laps(queue_, watch_, times_));
+      // Events are many; reading them now and then keeps their number small.
+      if (done % 64 == 63) watch_.read();
+    }
+    if (substeps - done >= long_run && !long_recording_.recorded())
+      long_recording_.record(queue_, [this] {
+        for (int k = 0; k < long_run; ++k) substep(Laps());
+      });
+    for (; substeps - done >= long_run; done += long_run) long_recording_.replay(queue_);
+    if (substeps > done && !short_recording_.recorded())
+      short_recording_.record(queue_, [this] { substep(Laps()); });
+    for (; done < substeps; ++done) short_recording_.replay(queue_);
   }
 
-  void use_given(const GivenInputs& given) {
+  void substep(const Laps& laps) {
+    with_periodic(c_, [&](auto periodic) {
+      constexpr bool p = decltype(periodic)::value;
+      const Arrays a = arrays();
+      search_.template density<p, false>(queue_, a, geometry(), FieldArrays{}, laps);
+      search_.template force<p, false>(queue_, a, FieldArrays{}, laps);
+      search_.template move<p>(queue_, a, geometry(), laps);
+    });
+  }
+
+  // One desk serves two: the state before an advance, and the fields of an evaluation.
+  static constexpr std::size_t desk_bytes = 2 * 8 + 15 * 4 + 2 * 4 + 2 * 4;
+
+  template <class T>
+  T* on_desk(std::size_t& at, std::size_t count) const {
+    T* p = reinterpret_cast<T*>(desk_.get() + at);
+    at += count * sizeof(T);
+    return p;
+  }
+
+  void save() {
+    std::size_t at = 0;
+    const auto n = static_cast<std::size_t>(n_);
+    queue_.copy(on_desk<float4>(at, n), state_.position.get(), n * sizeof(float4));
+    queue_.copy(on_desk<float4>(at, n), state_.velocity.get(), n * sizeof(float4));
+    queue_.copy(on_desk<int>(at, n), state_.id.get(), n * sizeof(int));
+  }
+  void put_back() {
+    std::size_t at = 0;
+    const auto n = static_cast<std::size_t>(n_);
+    queue_.copy(state_.position.get(), on_desk<float4>(at, n), n * sizeof(float4));
+    queue_.copy(state_.velocity.get(), on_desk<float4>(at, n), n * sizeof(float4));
+    queue_.copy(state_.id.get(), on_desk<int>(at, n), n * sizeof(int));
+  }
+
+  FieldArrays fields() const {
+    std::size_t at = 0;
+    const auto n = static_cast<std::size_t>(n_);
+    FieldArrays f{};
+    f.fluid_id_sum = on_desk<long long>(at, n);
+    f.wall_id_sum = on_desk<long long>(at, n);
+    f.pressure_acceleration = on_desk<float>(at, 3 * n);
+    f.viscous_acceleration = on_desk<float>(at, 3 * n);
+    f.wall_pressure_acceleration = on_desk<float>(at, 3 * n);
+    f.wall_viscous_acceleration = on_desk<float>(at, 3 * n);
+    f.acceleration = on_desk<float>(at, 3 * n);
+    f.density = on_desk<float>(at, n);
+    f.pressure = on_desk<float>(at, n);
+    f.fluid_count = on_desk<int>(at, n);
+    f.wall_count = on_desk<int>(at, n);
+    return f;
+  }
+  /// What no pass writes after this reads as NaN or −1.
+  FieldArrays unwritten_fields() {
+    desk_.resize(desk_.size());
+    return fields();
+  }
+
+  void use_given(const Arrays& a, const GivenInputs& given) {
     Buffer<float> density(static_cast<std::size_t>(n_)), pressure(static_cast<std::size_t>(n_));
-    density.upload(given.density.empty() ? density_.download(static_cast<std::size_t>(n_))
-                                         : given.density);
-    pressure.upload(given.pressure.empty() ? pressure_.download(static_cast<std::size_t>(n_))
-                                           : given.pressure);
-    for_each(n_, ThermoPass{arrays(), density.get(), pressure.get()});
-    thermo_.download(1);  // waits: the two buffers end here
+    density.upload(given.density);
+    pressure.upload(given.pressure);
+    queue_.for_each(n_, GivenPass{a, density.get(), pressure.get()});
+    queue_.wait();  // the two buffers end here
+  }
+
+  template <class T>
+  std::vector<T> from_desk(const T* at, std::size_t count) const {
+    std::vector<T> values(count);
+    desk_.download_bytes(values.data(), at, count * sizeof(T));
+    return values;
   }
 
   void download_fields(HostFields& out) const {
     const auto n = static_cast<std::size_t>(n_);
-    out.density = density_.download(n);
-    out.pressure = pressure_.download(n);
-    out.pressure_acceleration = download_rows(pressure_acceleration_, n_);
-    out.viscous_acceleration = download_rows(viscous_acceleration_, n_);
-    out.wall_pressure_acceleration = download_rows(wall_pressure_acceleration_, n_);
-    out.wall_viscous_acceleration = download_rows(wall_viscous_acceleration_, n_);
-    out.acceleration = download_rows(acceleration_, n_);
-    const auto ids = [n](const Buffer<long long>& from) {
-      const auto values = from.download(n);
+    const FieldArrays f = fields();
+    out.density = from_desk(f.density, n);
+    out.pressure = from_desk(f.pressure, n);
+    out.pressure_acceleration = from_desk(f.pressure_acceleration, 3 * n);
+    out.viscous_acceleration = from_desk(f.viscous_acceleration, 3 * n);
+    out.wall_pressure_acceleration = from_desk(f.wall_pressure_acceleration, 3 * n);
+    out.wall_viscous_acceleration = from_desk(f.wall_viscous_acceleration, 3 * n);
+    out.acceleration = from_desk(f.acceleration, 3 * n);
+    const auto wide = [](const auto& values) {
       return std::vector<std::int64_t>(values.begin(), values.end());
     };
-    out.fluid_count = ids(fluid_count_);
-    out.fluid_id_sum = ids(fluid_id_sum_);
-    out.wall_count = ids(wall_count_);
-    out.wall_id_sum = ids(wall_id_sum_);
+    out.fluid_count = wide(from_desk(f.fluid_count, n));
+    out.fluid_id_sum = wide(from_desk(f.fluid_id_sum, n));
+    out.wall_count = wide(from_desk(f.wall_count, n));
+    out.wall_id_sum = wide(from_desk(f.wall_id_sum, n));
   }
 
-  void clear_trouble() { trouble_.upload({~0ull, ~0ull}); }
-
-  Status status() const {
+  static Status status_of(const Mailbox& mail) {
     Status status;
-    unsigned long long first = ~0ull;
-    const auto words = trouble_.download(2);
-    const std::uint32_t bits[] = {Status::non_finite, Status::escaped};
-    for (int k = 0; k < 2; ++k) {
-      if (words[static_cast<std::size_t>(k)] == ~0ull) continue;
-      status.bits |= bits[k];
-      first = std::min(first, words[static_cast<std::size_t>(k)]);
-    }
+    const unsigned long long first = std::min(mail.non_finite, mail.escaped);
+    if (mail.non_finite != ~0ull) status.bits |= Status::non_finite;
+    if (mail.escaped != ~0ull) status.bits |= Status::escaped;
     if (!status.ok()) {
       status.particle = static_cast<std::int64_t>(first & 0xFFFFFFFFull);
       status.substep = static_cast<std::int64_t>(first >> 32);
@@ -233,28 +374,28 @@ class Pipeline : public DeviceSolver {
     return status;
   }
 
+  Queue queue_;
   Search search_;
   Constants c_{};
-  int containers_ = 0, n_ = -1, m_ = 0;
-  int first_moving_ = 0, moving_end_ = 0;  // wall particles between them may move
-  bool posed_still_ = false;
+  int containers_ = 0, n_ = 0, m_ = 0;
+  bool loaded_ = false;
   Buffer<Shape> shapes_;
   Buffer<Edge> edges_;
   Buffer<Box> boxes_;
   Buffer<Face> faces_;
   Buffer<DevicePose> poses_;
-  Buffer<float4> position_, velocity_;
-  Buffer<float> density_, pressure_;
-  Buffer<float2> thermo_;
-  Buffer<float4> pressure_acceleration_, viscous_acceleration_, wall_pressure_acceleration_,
-      wall_viscous_acceleration_, acceleration_;
-  Buffer<long long> fluid_count_, fluid_id_sum_, wall_count_, wall_id_sum_;
-  Buffer<float4> wall_local_, wall_, wall_velocity_;
+  State state_;
+  Buffer<float4> spare_position_, spare_velocity_, point_, motion_;
+  Buffer<char> desk_;
+  Buffer<Mailbox> mailbox_;
+  WallStore wall_store_{};
+  Buffer<float4> wall_local_;
+  Buffer<int> wall_id_, wall_container_;
   Buffer<float> wall_volume_;
-  Buffer<int> wall_container_;
-  Buffer<unsigned long long> trouble_;
+  std::int64_t rebuilds_ = 0, advances_ = 0;
   StageTimes times_;
   Stopwatch watch_;
+  Recording long_recording_, short_recording_;
 };
 
 }  // namespace decant::gpu::DECANT_EXECUTOR

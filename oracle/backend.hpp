@@ -37,7 +37,8 @@ struct Status {
 /// "non-finite value, particle 17, substep 2041"; "ok" without trouble.
 std::string describe(const Status& status);
 
-/// Seconds spent and number of passes, per stage of a substep, since `load`.
+/// Seconds spent and number of passes timed, per stage of a substep, since `load`. A backend may time
+/// some substeps and not others.
 struct StageTimes {
   struct Stage {
     double seconds = 0;
@@ -48,6 +49,7 @@ struct StageTimes {
 
 struct NeighborStats {
   std::int64_t rebuilds = 0;
+  std::int64_t device_bytes = 0;         // memory held; 0: not told
   double mean_fluid = 0, mean_wall = 0;  // neighbors a particle at the last evaluation
 };
 

@@ -3,18 +3,19 @@
 /// not timed.
 #include "oracle/conform.hpp"
 #include "reference/error.hpp"
+#include "reference/sampling.hpp"
+#include "reference/scene_checks.hpp"
 #include "tools/backend_choice.hpp"
+#include "tools/bench_rows.hpp"
 #include "tools/commands.hpp"
 #include "tools/fixture_folder.hpp"
 #include "tools/output_place.hpp"
-#include "version.hpp"
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <chrono>
-#include <fstream>
+#include <cmath>
 #include <memory>
 #include <string>
 #include <vector>
@@ -24,33 +25,106 @@ namespace {
 
 struct BenchArguments {
   std::vector<std::string> fixtures, backends;
-  std::string executor = "auto", json;
-  int substeps = 50, windows = 5;
+  std::string executor = "auto", json, report;
+  int substeps = 0, windows = 5, refine = 0;
 };
 
 constexpr const char* footer =
-    "Each window starts from the recorded state again and advances it by --substeps; one more\n"
-    "window before them warms up. The median window counts. Interactions are fluid and wall\n"
-    "neighbors at the recorded state. A backend that fails a check on the recording is not timed.\n"
+    "Each window starts from the recorded state again, advances it by a frame to warm up, and then by\n"
+    "--substeps, a frame's worth at a time as `pour` does. The median window counts. Stage times are\n"
+    "sampled and launch apart, so their sum may exceed a substep of a small scene. Interactions are\n"
+    "fluid and wall neighbors at the recorded state. A backend that fails a check on the recording is\n"
+    "not timed. --refine K makes eight particles of each, K times, and lets the backend itself settle\n"
+    "them for a while: sizes that no recording has. The recording is what the backend is judged on.\n"
     "Exit status: 0 timed, 1 something does not conform, 2 bad input, 3 a backend failed,\n"
     "77 the device of --executor is absent.\n"
     "\n"
     "Examples:\n"
-    "  decant bench --backend brute --executor cuda --json build/bench.json\n"
-    "  decant bench fixtures/pour-4k-stream.h5 --backend reference,reference:all-pairs";
+    "  decant bench --backend brute,hash,list --executor cuda --json build/bench.json\n"
+    "  decant bench fixtures/pour-4k-stream.h5 --backend hash,hash:pairs=rescan,list:skin=0.1";
+
+// Seconds that a window takes, about, where --substeps leaves it open.
+constexpr double usual_window = 0.1;
 
 struct Window {
   double seconds = 0;
+  std::int64_t substeps = 0, rebuilds = 0;
   StageTimes stages;
 };
 
-Window run_window(Backend& backend, const Fixture& fixture, const Walls& walls, int substeps) {
-  backend.load(fixture.scene, walls, fixture.state);
-  const auto start = std::chrono::steady_clock::now();
-  const Status status = backend.advance(substeps);
-  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+void require_ok(const Backend& backend, const Status& status) {
   if (!status.ok()) throw BackendError(backend.info().name + ": " + describe(status));
-  return {taken.count(), backend.stage_times()};
+}
+
+Window run_window(Backend& backend, const Fixture& fixture, const Walls& walls, int substeps) {
+  using Clock = std::chrono::steady_clock;
+  const int frame = fixture.scene.schedule.substeps_per_frame;
+  backend.load(fixture.scene, walls, fixture.state);
+  // The first advance may allocate and record; the second shows what a substep takes.
+  require_ok(backend, backend.advance(2));
+  auto start = Clock::now();
+  const int trial = substeps > 0 ? std::min(substeps, frame) : 2;
+  require_ok(backend, backend.advance(trial));
+  const double each = std::chrono::duration<double>(Clock::now() - start).count() / trial;
+  if (substeps == 0) {
+    const double wanted = std::clamp(usual_window / each, 2.0, 100.0 * frame);
+    substeps = wanted > frame ? static_cast<int>(wanted / frame) * frame : static_cast<int>(wanted);
+    if (substeps >= frame) require_ok(backend, backend.advance(frame));
+  }
+  const std::int64_t rebuilds_before = backend.neighbor_stats().rebuilds;
+  start = Clock::now();
+  for (int done = 0; done < substeps; done += frame)
+    require_ok(backend, backend.advance(std::min(frame, substeps - done)));
+  Window window;
+  window.seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  window.substeps = substeps;
+  window.rebuilds = backend.neighbor_stats().rebuilds - rebuilds_before;
+  window.stages = backend.stage_times();
+  return window;
+}
+
+// Substeps after which new particles are brought back to the speed they were made with, and how often:
+// what they gain in the meantime is the fall from places that were too close.
+constexpr int settling = 8, settlings = 12;
+
+/// Eight particles for one, at half the spacing, moved on by the backend until they have found their
+/// places, and then for a frame.
+Fixture refined(Backend& backend, Fixture fixture, int times) {
+  for (int t = 0; t < times; ++t) {
+    const double quarter = fixture.scene.particle_spacing / 4;
+    const auto n = fixture.state.size();
+    ParticleState fine;
+    fine.position.resize(3, 8 * n);
+    fine.velocity.resize(3, 8 * n);
+    for (Eigen::Index i = 0; i < n; ++i)
+      for (int k = 0; k < 8; ++k) {
+        const Vec3 side(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1);
+        fine.position.col(8 * i + k) = fixture.state.position.col(i) + quarter * side;
+        fine.velocity.col(8 * i + k) = fixture.state.velocity.col(i);
+      }
+    const double time = fixture.scene.time_at(fixture.state.substep);
+    fixture.scene = with_particles(fixture.scene, 8 * n);
+    fixture.scene.particle_spacing = 2 * quarter;
+    fine.substep = std::llround(time / fixture.scene.time_step());
+    fine.quantise();
+    const Walls walls = sample_walls(fixture.scene);
+    const Eigen::Matrix3Xd velocity = fine.velocity;
+    for (int k = 0; k < settlings; ++k) {
+      backend.load(fixture.scene, walls, fine);
+      require_ok(backend, backend.advance(settling));
+      backend.read(fine);
+      fine.velocity = velocity;
+    }
+    backend.load(fixture.scene, walls, fine);
+    require_ok(backend, backend.advance(fixture.scene.schedule.substeps_per_frame));
+    backend.read(fixture.state);
+  }
+  return fixture;
+}
+
+/// A stage's time in µs each time it runs.
+double each_us(const StageTimes::Stage& stage) {
+  return stage.calls > 0 ? 1e6 * stage.seconds / static_cast<double>(stage.calls) : 0;
 }
 
 /// Why the backend must not be timed; empty where it conforms.
@@ -62,79 +136,58 @@ std::string objection(Backend& backend, const Fixture& fixture, const Judgement&
   return {};
 }
 
-nlohmann::ordered_json time_backend(Backend& backend, const Fixture& fixture, const Walls& walls,
-                                    const BenchArguments& arguments) {
+BenchRow time_backend(Backend& backend, const Fixture& fixture, const Walls& walls,
+                      const BenchArguments& arguments) {
   std::vector<Window> windows;
-  for (int w = 0; w <= arguments.windows; ++w) {
-    const Window window = run_window(backend, fixture, walls, arguments.substeps);
-    if (w > 0) windows.push_back(window);
-  }
-  const auto middle = windows.begin() + static_cast<std::ptrdiff_t>(windows.size() / 2);
-  std::nth_element(windows.begin(), middle, windows.end(),
-                   [](const Window& a, const Window& b) { return a.seconds < b.seconds; });
-  const auto microseconds = [&](double seconds) { return 1e6 * seconds / arguments.substeps; };
-  const StageTimes& s = middle->stages;
-  const double named = s.build.seconds + s.density.seconds + s.force.seconds + s.integrate.seconds;
-  nlohmann::ordered_json stages = nullptr;  // of a backend that does not tell
-  if (named > 0)
-    stages = {{"build", microseconds(s.build.seconds)},
-              {"density", microseconds(s.density.seconds)},
-              {"force", microseconds(s.force.seconds)},
-              {"integrate", microseconds(s.integrate.seconds)},
-              {"other", std::max(0.0, microseconds(middle->seconds - named))}};
+  for (int w = 0; w < arguments.windows; ++w)
+    windows.push_back(run_window(backend, fixture, walls, arguments.substeps));
+  const auto substep_us = [](const Window& w) {
+    return 1e6 * w.seconds / static_cast<double>(w.substeps);
+  };
+  std::sort(windows.begin(), windows.end(),
+            [&](const Window& a, const Window& b) { return substep_us(a) < substep_us(b); });
+  const Window& middle = windows[windows.size() / 2];
+  const BackendInfo info = backend.info();
+  BenchRow row;
+  row.backend = info.name;
+  row.options = info.options;
+  row.executor = info.executor;
+  row.device = info.device;
+  row.window = fixture.phase;
+  row.particles = fixture.state.size();
+  row.wall_particles = walls.size();
+  row.substeps = middle.substeps;
+  row.substep_us = substep_us(middle);
+  row.fastest_us = substep_us(windows.front());
+  row.slowest_us = substep_us(windows.back());
+  row.conformant = true;
+
+  const StageTimes& s = middle.stages;
+  row.tells_stages = s.force.calls > 0;
+  // Where not every substep builds, those that build find their densities meanwhile.
+  const double substeps = static_cast<double>(middle.substeps);
+  const double builds = middle.rebuilds > 0 ? static_cast<double>(middle.rebuilds) / substeps : 1;
+  const double reuses = builds < 1 ? 1 - builds : 1;
+  row.stages_us = {builds * each_us(s.build), reuses * each_us(s.density), each_us(s.force),
+                   each_us(s.integrate), 0};
+  double named = 0;
+  for (const double stage : row.stages_us) named += stage;
+  row.stages_us.back() = std::max(0.0, row.substep_us - named);
+  if (middle.rebuilds > 0) row.substeps_per_rebuild = 1 / builds;
 
   backend.load(fixture.scene, walls, fixture.state);
   Fields fields = Fields::unwritten(fixture.state.size(), walls.size());
-  if (const Status status = backend.evaluate(fields); !status.ok())
-    throw BackendError(backend.info().name + ": " + describe(status));
-  const double neighbors = fields.fluid_neighbor_count.cast<double>().mean() +
-                           fields.wall_neighbor_count.cast<double>().mean();
-  const BackendInfo info = backend.info();
-  const double substep = microseconds(middle->seconds);
-  return {
-      {"backend", info.name},
-      {"options", info.options},
-      {"executor", info.executor},
-      {"device", info.device},
-      {"particles", fixture.state.size()},
-      {"window", fixture.phase},
-      {"substep_us", substep},
-      {"stages_us", stages},
-      {"neighbors_mean", neighbors},
-      {"interactions_per_s", neighbors * static_cast<double>(fixture.state.size()) / substep * 1e6},
-      {"conformant", true}};
-}
-
-void print(const nlohmann::ordered_json& row) {
-  const auto text = [&](const char* key) { return row.at(key).get<std::string>(); };
-  const std::string options = text("options").empty() ? "" : ":" + text("options");
-  std::string stages;
-  if (row.at("stages_us").is_object())
-    for (const auto& [name, value] : row.at("stages_us").items())
-      stages += fmt::format("  {} {:.1f}", name, value.get<double>());
-  fmt::print("{:<22} {:<9} {:>9} {:<10} {:>12.1f}   {:.3g} interactions/s{}\n",
-             text("backend") + options, text("executor"), row.at("particles").get<std::int64_t>(),
-             text("window"), row.at("substep_us").get<double>(),
-             row.at("interactions_per_s").get<double>(), stages);
-  std::fflush(stdout);
-}
-
-void write_json(const std::string& file, const nlohmann::ordered_json& rows) {
-  const nlohmann::ordered_json all = {{"decant_bench", 1},
-                                      {"rows", rows},
-                                      {"provenance",
-                                       {{"version", version},
-                                        {"git_revision", git_revision},
-                                        {"compiler", compiler},
-                                        {"flags", flags},
-                                        {"build_type", build_type}}}};
-  std::ofstream out(file);
-  out << all.dump(2) << '\n';
-  if (!out.flush()) throw InputError("command line", "--json", file, "a file that can be written");
+  require_ok(backend, backend.evaluate(fields));
+  row.neighbors_mean = fields.fluid_neighbor_count.cast<double>().mean() +
+                       fields.wall_neighbor_count.cast<double>().mean();
+  row.device_bytes_per_particle = static_cast<double>(backend.neighbor_stats().device_bytes) /
+                                  static_cast<double>(fixture.state.size());
+  return row;
 }
 
 int bench(const BenchArguments& arguments) {
   check_output_place("--json", arguments.json);
+  check_output_place("--report", arguments.report);
   std::vector<std::unique_ptr<Backend>> backends;
   auto names = arguments.backends;
   if (names.empty()) {
@@ -145,9 +198,8 @@ int bench(const BenchArguments& arguments) {
   std::vector<std::filesystem::path> files(arguments.fixtures.begin(), arguments.fixtures.end());
   if (files.empty()) files = fixtures_in(fixture_folder(), false);
 
-  fmt::print("{:<22} {:<9} {:>9} {:<10} {:>12}\n", "backend", "executor", "particles", "window",
-             "us/substep");
-  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  fmt::print("{}\n", bench_heading());
+  std::vector<BenchRow> rows;
   int status = exit_pass;
   for (const auto& file : files) {
     const Fixture fixture = read_fixture(file);
@@ -158,11 +210,26 @@ int bench(const BenchArguments& arguments) {
         status = exit_does_not_conform;
         continue;
       }
-      rows.push_back(time_backend(*backend, fixture, oracle.walls, arguments));
-      print(rows.back());
+      try {
+        if (arguments.refine > 0) {
+          const Fixture fine = refined(*backend, fixture, arguments.refine);
+          rows.push_back(time_backend(*backend, fine, sample_walls(fine.scene), arguments));
+        } else {
+          rows.push_back(time_backend(*backend, fixture, oracle.walls, arguments));
+        }
+      } catch (const BackendError& error) {
+        const BackendInfo info = backend->info();
+        fmt::print("{:<28} breaks down, is not timed: {}\n",
+                   info.name + (info.options.empty() ? "" : ":" + info.options), error.what());
+        status = exit_failure;
+        continue;
+      }
+      fmt::print("{}\n", to_text(rows.back()));
+      std::fflush(stdout);
     }
   }
-  if (!arguments.json.empty()) write_json(arguments.json, rows);
+  if (!arguments.json.empty()) write_bench_json(arguments.json, rows);
+  if (!arguments.report.empty()) write_bench_hdf5(arguments.report, rows);
   return status;
 }
 
@@ -178,13 +245,16 @@ void add_bench_command(CLI::App& app, int& exit_status) {
       ->delimiter(',')
       ->allow_extra_args(false);
   verb->add_option("--executor", arguments->executor, "auto, cuda or host")->capture_default_str();
-  verb->add_option("--substeps", arguments->substeps, "substeps in a window")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
+  verb->add_option("--substeps", arguments->substeps,
+                   "substeps in a window; default: as many as take a tenth of a second")
+      ->check(CLI::Range(1, 1000000));
   verb->add_option("--windows", arguments->windows, "windows to take the median of")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
+  verb->add_option("--refine", arguments->refine, "eight particles for one, so many times")
+      ->check(CLI::Range(0, 4));
   verb->add_option("--json", arguments->json, "write rows as JSON");
+  verb->add_option("--report", arguments->report, "write rows as HDF5");
   verb->callback([arguments, &exit_status] { exit_status = bench(*arguments); });
 }
 

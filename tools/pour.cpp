@@ -23,6 +23,7 @@
 #include <chrono>
 #include <memory>
 #include <optional>
+#include <random>
 #include <utility>
 
 namespace decant {
@@ -178,6 +179,12 @@ PourResult Pour::run() {
 
 void Pour::start() {
   state_ = initial_state(scene_);
+  if (options_.perturbation != 0) {
+    std::mt19937 random(options_.perturbation);
+    for (double& x : state_.position.reshaped())
+      x *= 1 + 0x1p-22 * (2.0 * static_cast<double>(random()) / 4294967295.0 - 1);
+    state_.quantise();
+  }
   layout_ = frame_layout(scene_, state_.size());
   check_room(options_, files_, layout_, 0);
   backend_.load(scene_, walls_, state_);

@@ -10,6 +10,7 @@
 #include "reference/scene.hpp"
 #include "tools/timeline.hpp"
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 
@@ -20,6 +21,9 @@ struct PourOptions {
   bool csv = false, resume = false, quiet = false;
   double checkpoint_seconds = 30;  // s, wall time between checkpoints; 0: at every frame
   std::function<bool()> stop;      // asked after every frame; true: leave a checkpoint and return
+  /// Not 0: every coordinate of the start is changed by a random part, up to 2⁻²², seeded with this. Pours
+  /// that differ in nothing else show how far apart their ends may be.
+  std::uint32_t perturbation = 0;
 };
 
 struct PourResult {

@@ -23,6 +23,7 @@ namespace {
 struct PourArguments {
   std::string scene, out, backend = "reference", executor = "auto";
   std::optional<std::int64_t> particles, frames;
+  std::uint32_t perturbation = 0;
   bool csv = false, resume = false, quiet = false, json = false;
 };
 
@@ -166,6 +167,7 @@ int run(const PourArguments& arguments) {
   PourOptions options;
   options.out = arguments.out;
   options.csv = arguments.csv;
+  options.perturbation = arguments.perturbation;
   options.resume = arguments.resume;
   options.quiet = arguments.quiet;
   options.stop = [] { return caught_signal != 0; };
@@ -199,6 +201,8 @@ void add_pour_command(CLI::App& app, int& exit_status) {
                       "About this many; spacing and all that follows are derived anew");
   command->add_option("--frames", a->frames,
                       "Frames over the same time; the substep stays within its limits");
+  command->add_option("--perturb", a->perturbation,
+                      "Seed of a random change of the start in its last bits, for ensembles");
   command->add_flag("--csv", a->csv, "Also write csv/fluid_000123.csv and boundaries");
   command->add_flag("--resume", a->resume, "Go on from the folder's last checkpoint");
   command->add_flag("--quiet", a->quiet, "Say nothing but errors");

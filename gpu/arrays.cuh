@@ -1,0 +1,65 @@
+/// \file
+/// The device arrays of one scene, as passes see them.
+#pragma once
+
+#include "gpu/physics.cuh"
+
+#include <cstdint>
+
+namespace decant::gpu::DECANT_EXECUTOR {
+
+/// Particles in some order. Position: x, y, z, |x|²; velocity: x, y, z, 0. After the fluid, from
+/// Arrays::base on, wall particles: x, y, z, V_b (brute force: |x|²).
+struct Particles {
+  float4 *position, *velocity;
+};
+
+/// What the device tells the host, read once an advance.
+struct Mailbox {
+  unsigned long long non_finite, escaped;  // (substep << 32) | smallest id; all ones: none
+  unsigned substep;                        // under way, from 1 within this advance
+  int longest_list;                        // entries that the longest list needs
+  int rebuilds;
+  int stale;                               // neighbors must be looked for anew
+  float skin;                              // of the lists of this advance, m
+  int fastest;                             // |v|² of the fastest particle, float bits
+};
+
+struct Arrays {
+  int n;             // fluid particles
+  int base;          // where wall particles begin in the arrays below; n, rounded up to whole tiles
+  Particles now;     // where the substep begins, in the order in which passes run
+  Particles next;    // where it ends, same order
+  int* id;           // of each, same order
+  float4 *point, *motion;  // x, y, z, p/rho² and v, 1/rho: what neighbors read in the force pass;
+                           // of wall particles x, y, z, 0 and v, V_b
+  float4* acceleration;    // may lie over `now.position`, which only the density pass reads
+  Mailbox* mailbox;
+  const DevicePose* poses;  // containers × (substeps + 1), substep major
+  int containers;
+
+  DECANT_DEVICE const DevicePose* poses_at_end() const {
+    return poses + static_cast<std::size_t>(mailbox->substep) * static_cast<std::size_t>(containers);
+  }
+  DECANT_DEVICE const DevicePose* poses_now() const { return poses_at_end() - containers; }
+};
+
+/// Results of `evaluate`, by id. Vectors are [n,3].
+struct FieldArrays {
+  float *density, *pressure;
+  float *pressure_acceleration, *viscous_acceleration, *wall_pressure_acceleration,
+      *wall_viscous_acceleration, *acceleration;
+  int *fluid_count, *wall_count;
+  long long *fluid_id_sum, *wall_id_sum;
+};
+
+DECANT_DEVICE bool is_finite(Float3 v) {
+  return fabsf(v.x) <= 3.0e38f && fabsf(v.y) <= 3.0e38f && fabsf(v.z) <= 3.0e38f;
+}
+
+DECANT_DEVICE void report(unsigned long long* word, unsigned substep, int particle) {
+  atomic_minimum(word, (static_cast<unsigned long long>(substep) << 32) |
+                           static_cast<unsigned>(particle));
+}
+
+}  // namespace decant::gpu::DECANT_EXECUTOR

@@ -1,0 +1,34 @@
+/// \file
+/// What can be chosen about a backend. None of it changes the answer beyond rounding.
+#pragma once
+
+#include <string>
+
+namespace decant::gpu {
+
+struct SolverOptions {
+  enum class Grid { fluid, all };            // which particles have cells; others are all looked at
+  enum class Source { frame, rebuilt };      // moving walls: in their frame, or sorted every substep
+  enum class Sort { counting, thrust };
+  enum class Pairs { keep, rescan };         // hash: the force pass reads a list, or cells again
+  enum class Build { grid, all_pairs };      // list: from cells, or from all pairs
+  enum class Trigger { local, global };      // list: what `rebuild auto` watches
+
+  Grid grid = Grid::all;
+  Source source = Source::frame;
+  Sort sort = Sort::counting;
+  Pairs pairs = Pairs::keep;
+  Build build = Build::grid;
+  Trigger trigger = Trigger::global;
+  int rebuild = 0;      // list: every so many substeps; 0: as soon as a pair could be missed
+  double skin = -1;     // list: of H; negative: by the speed of the fastest particle
+  int lanes = 0;        // threads a particle; 0: by the number of particles
+  int capacity = 0;     // entries a list begins with; 0: by the skin
+  bool graphs = true;   // substeps are recorded once and replayed
+};
+
+/// Options as the command line gives them, "key=value:key=value", for a backend that knows `keys`.
+/// Throws InputError for an unknown key or a value out of range.
+SolverOptions parse_options(const std::string& backend, const std::string& text);
+
+}  // namespace decant::gpu

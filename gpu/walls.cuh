@@ -1,0 +1,118 @@
+/// \file
+/// Wall particles. In passes they are particles like any other, with a place in the world; moving
+/// ones are placed anew at the end of every substep. They are looked up in their container's own frame,
+/// where they never move: the grid of the moving source is built once, like that of the receiver.
+#pragma once
+
+#include "gpu/arrays.cuh"
+#include "gpu/cells.cuh"
+#include "gpu/contact.cuh"
+
+namespace decant::gpu::DECANT_EXECUTOR {
+
+/// One container's wall particles, slots [begin, end); begin is a multiple of tile_size.
+struct WallSegment {
+  int begin, end;
+  CellTable table;
+  Float3 low, high;  // no wall particle is within reach of a point outside, in the frame of lookups
+  // By bucket, for a grid that is never rebuilt: which wall particles may be within reach of the cell,
+  // near[near_start[bucket]] on. Null: to be looked up row by row.
+  const int *near_start, *near;
+  bool in_world;  // looked up in the world, not in the container's frame
+};
+
+/// Slots of all containers, each padded to whole tiles; an id of −1 is padding.
+struct Walls {
+  const float4* local;     // container frame
+  int* id;
+  const int* container;
+  const float* volume;     // V_b by id
+  bool square;             // positions carry |x|² instead of V_b
+};
+
+DECANT_DEVICE void place_wall(const Arrays& a, const Walls& w, int slot, Float3 x, int id,
+                              const DevicePose& pose) {
+  const Float3 v = cross(pose.omega, x - pose.pivot);
+  const float volume = w.volume[id];
+  a.now.position[a.base + slot] = w.square ? point_at(x) : make_float4(x.x, x.y, x.z, volume);
+  a.point[a.base + slot] = make_float4(x.x, x.y, x.z, 0.0f);
+  a.motion[a.base + slot] = make_float4(v.x, v.y, v.z, volume);
+}
+
+/// Wall particles to their place in the world.
+struct PosePass {
+  Arrays a;
+  Walls walls;
+  int first;
+  bool at_end;  // of the substep under way
+
+  DECANT_DEVICE void operator()(int k) const {
+    const int slot = first + k, id = walls.id[slot];
+    if (id < 0) return;
+    const DevicePose& pose = (at_end ? a.poses_at_end() : a.poses_now())[walls.container[slot]];
+    place_wall(a, walls, slot, rotate(pose, xyz(walls.local[slot])) + pose.translation, id, pose);
+  }
+};
+
+/// Wall particles where their frame has them, to find their volumes.
+struct UnposedPass {
+  Arrays a;
+  Walls walls;
+  DECANT_DEVICE void operator()(int slot) const {
+    a.now.position[a.base + slot] = point_at(xyz(walls.local[slot]));
+  }
+};
+
+/// V_b = 1 / Σ_k W_bk over the wall particles of the same container, itself included, by id.
+template <class Query>
+struct VolumePass {
+  Constants c;
+  Arrays a;
+  Query query;
+  Walls walls;
+  int container, begin;  // its first slot
+  float* volume;
+
+  template <class Team>
+  DECANT_DEVICE void operator()(Team& team, int k, bool active) const {
+    const int slot = begin + k;
+    float sum = 0.0f;
+    query.of_segment(team, container, xyz(a.now.position[a.base + slot]), a.now.position,
+                     [&](int, float4, Float3, float r2) DECANT_INLINE { sum += kernel_w(c, radius(r2)); });
+    sum = team.sum(sum);
+    if (active && team.leads()) volume[walls.id[slot]] = 1.0f / sum;
+  }
+};
+
+/// Counts, and then fills, WallSegment::near.
+template <bool periodic>
+struct NearPass {
+  CellTable table;
+  int base, begin;   // index and slot of the segment's first wall particle
+  const float4* local;
+  int used[3];       // cells an axis that hold the segment; 0: its ends meet in the table
+  float reach2;
+  int* count;        // null: fill
+  const int* start;
+  int* near;
+
+  DECANT_DEVICE void operator()(int bucket) const {
+    int found = 0;
+    for (int d = 0; d < 9 && table.in_table(bucket); ++d) {
+      CellTable::Range r = table.row<periodic>(bucket, d);
+      for (int part = 0; part < 2; ++part) {
+        for (int b = r.begin; b < r.end; ++b) {
+          if (used[0] > 0 &&
+              !(table.distance2(bucket, used, xyz(local[begin + b])) < 1.0001f * reach2))
+            continue;
+          if (!count) near[start[bucket] + found] = base + b;
+          ++found;
+        }
+        r = {r.begin2, r.end2, 0, 0};
+      }
+    }
+    if (count) count[bucket] = found;
+  }
+};
+
+}  // namespace decant::gpu::DECANT_EXECUTOR
