@@ -60,11 +60,12 @@ struct CellTable {
   }
 
   /// Distance² of a point from a bucket's cell, where the cells of all things lie side by side in the
-  /// table, `used` cells an axis from the origin on; cells beyond those and one more are before it.
+  /// table, `used` cells an axis from the origin on; what is within reach of them is at most three cells
+  /// beyond, so cells farther on are before the origin.
   DECANT_DEVICE float distance2(int bucket, const int used[3], Float3 x) const {
     const Cell c = cell_of(bucket);
     const auto off = [&](int axis, int at, float to) {
-      const int cell = at > used[axis] + 1 ? at - wrap[axis] : at;
+      const int cell = at > used[axis] + 3 ? at - wrap[axis] : at;
       const double low = origin[axis] + cell / inverse_cell[axis];
       const double high = origin[axis] + (cell + 1) / inverse_cell[axis];
       return to < low ? low - to : to > high ? to - high : 0.0;
@@ -154,7 +155,7 @@ inline CellTable make_cell_table(const Constants& c, double reach, const double 
     t.origin[a] = std::floor(low[a] / cell) * cell;
     t.wrap[a] = a == 0 ? 8 : 4;
     const double extent = (high[a] - low[a]) / cell;
-    wanted[a] = extent > 4 ? extent + 8 : 4;  // NaN: 4
+    wanted[a] = extent > 4 ? extent + 12 : 4;  // NaN: 4
   }
   const auto buckets = [&] { return double(t.wrap[0]) * t.wrap[1] * t.wrap[2]; };
   for (;;) {

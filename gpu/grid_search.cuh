@@ -319,7 +319,7 @@ class GridSearch {
       for (int axis = 0; axis < 3; ++axis) {
         const double cells = (high[axis] - s.table.origin[axis]) * s.table.inverse_cell[axis];
         side_by_side = side_by_side && cells >= 0 && low[axis] >= s.table.origin[axis] &&
-                       cells + 6 < s.table.wrap[axis];
+                       cells + 9 < s.table.wrap[axis];
         pass.used[axis] = static_cast<int>(cells) + 1;
       }
       if (!side_by_side) pass.used[0] = 0;

@@ -50,7 +50,7 @@ class Pipeline : public DeviceSolver {
     std::vector<float> own_volume = wall_volume_.download(static_cast<std::size_t>(m_));
     if (!given.boundary_volume.empty()) wall_volume_.upload(given.boundary_volume);
     Mailbox mail;
-    do {
+    for (;;) {
       begin();
       FieldArrays fields = unwritten_fields();
       with_periodic(c_, [&](auto periodic) {
@@ -62,7 +62,8 @@ class Pipeline : public DeviceSolver {
       });
       queue_.wait();
       mail = mailbox_.download(1)[0];
-    } while (search_.grow(mail.longest_list));
+      if (!grow(mail)) break;
+    }
     download_fields(out);
     wall_volume_.upload(own_volume);
     out.boundary_volume = std::move(own_volume);
@@ -79,10 +80,7 @@ class Pipeline : public DeviceSolver {
       run(substeps);
       queue_.wait();
       mail = mailbox_.download(1)[0];
-      if (!search_.grow(mail.longest_list)) break;
-      // Recordings know where the lists were.
-      long_recording_.clear();
-      short_recording_.clear();
+      if (!grow(mail)) break;
       put_back();
     }
     watch_.read();
@@ -270,6 +268,14 @@ class Pipeline : public DeviceSolver {
     for (; done < substeps; ++done) short_recording_.replay(queue_);
   }
 
+  /// Whether lists were too short and have grown. Recordings know where the lists were.
+  bool grow(const Mailbox& mail) {
+    if (mail.longest_list == 0 || !search_.grow(mail.longest_list)) return false;
+    long_recording_.clear();
+    short_recording_.clear();
+    return true;
+  }
+
   void substep(const Laps& laps) {
     with_periodic(c_, [&](auto periodic) {
       constexpr bool p = decltype(periodic)::value;
@@ -367,7 +373,9 @@ class Pipeline : public DeviceSolver {
     const unsigned long long first = std::min(mail.non_finite, mail.escaped);
     if (mail.non_finite != ~0ull) status.bits |= Status::non_finite;
     if (mail.escaped != ~0ull) status.bits |= Status::escaped;
-    if (!status.ok()) {
+    // Nobody grew what was too short: whatever came out of it is not to be used.
+    if (mail.longest_list != 0) status.bits |= Status::capacity;
+    if (first != ~0ull) {
       status.particle = static_cast<std::int64_t>(first & 0xFFFFFFFFull);
       status.substep = static_cast<std::int64_t>(first >> 32);
     }

@@ -7,10 +7,16 @@
 
 #include "gpu/backends.hpp"
 #include "oracle/reference_backend.hpp"
+#include "reference/distance.hpp"
+#include "reference/pose.hpp"
 #include "reference/error.hpp"
 #include "tools/fixture_folder.hpp"
 
 #include <gtest/gtest.h>
+
+#include <random>
+#include <string>
+#include <vector>
 #include <rapidcheck/gtest.h>
 
 namespace decant {
@@ -87,6 +93,44 @@ TEST_P(Conformance, HoldsOnRandomScenes) {
     RC_LOG() << found;
     RC_ASSERT(found.empty());
   });
+}
+
+/// Particles at rest all around the containers of a recording, inside and outside, near enough to their
+/// walls to have neighbors there: where no pour leads many.
+Fixture around_walls(const char* recording, std::uint32_t seed) {
+  Fixture f = read_fixture(std::string(DECANT_SOURCE_DIR "/fixtures/") + recording);
+  f.name = "around-" + f.name;
+  std::mt19937 random(seed);
+  const double dx = f.scene.particle_spacing, H = f.scene.support_radius();
+  const double time = f.scene.time_at(f.state.substep);
+  std::vector<Vec3> kept;
+  for (const Container& container : f.scene.containers) {
+    const SolidDistance solid(container);
+    const Pose pose = pose_at(container, time);
+    const auto real = [&](double low, double high) {
+      return std::uniform_real_distribution<double>(low, high)(random);
+    };
+    for (int found = 0; found < 400;) {
+      const Vec3 local(real(-0.08, 0.08), real(-0.08, 0.08), real(-0.03, 0.13));
+      const double distance = solid.at(local).distance;
+      const Vec3 x = pose.rotation * local + pose.translation;
+      if (!(distance > 0.3 * dx && distance < H) || x.z() < dx) continue;
+      ++found;
+      kept.push_back(x);
+    }
+  }
+  f.state.position.resize(3, static_cast<Eigen::Index>(kept.size()));
+  for (std::size_t i = 0; i < kept.size(); ++i)
+    f.state.position.col(static_cast<Eigen::Index>(i)) = kept[i];
+  f.state.velocity.setZero(3, f.state.position.cols());
+  f.state.quantise();
+  return f;
+}
+
+TEST_P(Conformance, HoldsAllAroundTheWalls) {
+  const auto tested = backend();
+  for (const char* recording : {"pour-4k-settled.h5", "pour-4k-stream.h5"})
+    EXPECT_EQ(objections(*tested, answered(around_walls(recording, 1))), "") << recording;
 }
 
 /// How far apart two backends are after some substeps, in particle spacings.
