@@ -1,0 +1,49 @@
+#!/usr/bin/env python3
+"""Prints the kernels of ncu's raw CSV (ci/gpu leaves kernels.csv) as a table, one line a kernel."""
+
+import argparse
+import csv
+import re
+import sys
+
+COLUMNS = [  # heading, metric, scale
+    ("us", "gpu__time_duration.sum", 1e-3),
+    ("registers", "launch__registers_per_thread", 1),
+    ("occupancy %", "sm__warps_active.avg.pct_of_peak_sustained_active", 1),
+    ("M instr.", "smsp__inst_executed.sum", 1e-6),
+    ("issue %", "smsp__issue_active.avg.pct_of_peak_sustained_active", 1),
+    ("lanes of 32", "smsp__thread_inst_executed_per_inst_executed.ratio", 1),
+    ("L1 hit %", "l1tex__t_sector_hit_rate.pct", 1),
+    ("M L2 sectors", "lts__t_sectors.sum", 1e-6),
+]
+
+
+def short(name):
+    name = re.sub(r"decant::|gpu::cuda::|void |\(int\)|\(bool\)", "", name)
+    return re.sub(r"\(.*", "", name)[:66]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("csv", help="ncu --csv --page raw")
+    arguments = parser.parse_args()
+    with open(arguments.csv, newline="") as file:
+        rows = list(csv.reader(file))
+    header = None
+    last = {}
+    for row in rows:
+        if "Kernel Name" in row:
+            header = row
+        elif header and len(row) == len(header) and row[header.index("ID")].isdigit():
+            name = short(row[header.index("Kernel Name")])
+            last[name] = [float(row[header.index(metric)].replace(",", "")) * scale
+                          for _, metric, scale in COLUMNS]
+    if not last:
+        sys.exit(f"{arguments.csv}: no kernels of ncu's raw page")
+    print(f"{'kernel':66}" + "".join(f"{heading:>13}" for heading, _, _ in COLUMNS))
+    for name, values in last.items():
+        print(f"{name:66}" + "".join(f"{value:13.2f}" for value in values))
+
+
+if __name__ == "__main__":
+    main()
