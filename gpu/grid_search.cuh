@@ -8,109 +8,14 @@
 /// decided on the device. The density of such a substep is found while its lists are made.
 #pragma once
 
+#include "gpu/grid_sources.cuh"
 #include "gpu/pipeline.cuh"
 #include "gpu/queries.cuh"
-#include "gpu/sort.cuh"
-#include "gpu/trigger.cuh"
 
 #include <algorithm>
 #include <cmath>
 
 namespace decant::gpu::DECANT_EXECUTOR {
-
-/// Watch::origin of a particle that is at x when lists are made.
-DECANT_DEVICE float4 origin_at(const Constants& c, const Arrays& a, const DeviceGeometry& geometry,
-                               float4 x) {
-  const float skin = sound_skin(a.mailbox->skin);
-  const float far = clearance(c, geometry, a.poses_now(), xyz(x)) - c.H;
-  return make_float4(x.x, x.y, x.z, far > skin ? far : skin);
-}
-
-/// Fluid on its way into the order of its cells.
-struct FluidSource {
-  Constants c;
-  Arrays a;
-  Particles from, into;
-  int* bucket;
-  // Of lists that are kept; null otherwise.
-  float4* origin;
-  DevicePose* built;
-  DeviceGeometry geometry;
-  bool tick;  // nobody else counts substeps
-
-  DECANT_DEVICE Float3 position(int i) const { return xyz(from.position[i]); }
-  DECANT_DEVICE int id(int i) const { return a.id[i]; }
-  DECANT_DEVICE void begin() const {
-    if (tick) ++a.mailbox->substep;
-    a.mailbox->stale = 0;
-    ++a.mailbox->rebuilds;
-  }
-  DECANT_DEVICE void place(int i, int id, int to, int in_bucket) const {
-    const float4 x = from.position[i];
-    into.position[to] = x;
-    into.velocity[to] = from.velocity[i];
-    a.id[to] = id;
-    bucket[to] = in_bucket;
-    if (!origin) return;
-    const DevicePose* poses = a.poses_now();
-    origin[to] = origin_at(c, a, geometry, x);
-    if (to < a.containers) built[to] = poses[to];
-  }
-};
-
-/// A container's wall particles on their way into the order of the cells of their frame.
-struct FrameWallSource {
-  const float4* from;
-  const int* from_id;
-  float4* local;
-  int* to_id;
-
-  DECANT_DEVICE Float3 position(int k) const { return xyz(from[k]); }
-  DECANT_DEVICE int id(int k) const { return from_id[k]; }
-  DECANT_DEVICE void begin() const {}
-  DECANT_DEVICE void place(int k, int id, int to, int) const {
-    local[to] = from[k];
-    to_id[to] = id;
-  }
-};
-
-/// The same into the order of cells in the world, as it stands at the start of the substep.
-struct WorldWallSource {
-  Arrays a;
-  Walls walls;
-  FrameWallSource frame;
-  int first, container;
-
-  DECANT_DEVICE Float3 position(int k) const {
-    const DevicePose& pose = a.poses_now()[container];
-    return rotate(pose, frame.position(k)) + pose.translation;
-  }
-  DECANT_DEVICE int id(int k) const { return frame.id(k); }
-  DECANT_DEVICE void begin() const {}
-  DECANT_DEVICE void place(int k, int id, int to, int bucket) const {
-    frame.place(k, id, to, bucket);
-    place_wall(a, walls, first + to, position(k), id, a.poses_now()[container]);
-  }
-};
-
-/// Lists from all pairs: particles stay where they are.
-struct StayPass {
-  FluidSource source;
-  DECANT_DEVICE void operator()(int i) const {
-    if (i == 0) source.begin();
-    const float4 x = source.from.position[i];
-    const DevicePose* poses = source.a.poses_now();
-    source.bucket[i] = 0;
-    source.origin[i] = origin_at(source.c, source.a, source.geometry, x);
-    if (i < source.a.containers) source.built[i] = poses[i];
-  }
-};
-
-/// After a substep's integration: counts for the sort of the next one.
-struct CountCell {
-  KeyPass<FluidSource> counter;
-  DECANT_DEVICE void operator()(int i, Float3 x) const { counter.count_in(i, x); }
-};
 
 class GridSearch {
  public:

@@ -17,6 +17,20 @@ namespace {
   throw InputError("command line", option, value, bound);
 }
 
+struct BackendFlag {
+  const char *backend, *key, *help;
+};
+constexpr BackendFlag backend_flags[] = {
+    {"hash", "grid", "all or fluid: what has cells"},
+    {"hash", "source", "frame or rebuilt: how moving walls are looked up"},
+    {"hash", "sort", "counting or thrust"},
+    {"hash", "pairs", "keep or rescan: what the force pass reads"},
+    {"list", "build", "grid or all-pairs"},
+    {"list", "rebuild", "auto, or every so many substeps"},
+    {"list", "trigger", "global or local: what --rebuild auto watches"},
+    {"list", "skin", "auto, or a share of H"},
+};
+
 Executor executor_of(const std::string& name) {
   if (name != "auto" && name != "cuda" && name != "host")
     refuse("--executor", name, "must be auto, cuda or host");
@@ -28,6 +42,33 @@ Executor executor_of(const std::string& name) {
 }
 
 }  // namespace
+
+void BackendFlags::add_to(CLI::App& verb) {
+  for (const BackendFlag& flag : backend_flags)
+    verb.add_option_function<std::string>(
+            std::string("--") + flag.key,
+            [this, key = std::string(flag.key)](const std::string& value) { given[key] = value; },
+            flag.help)
+        ->group("Options of backends");
+}
+
+std::string BackendFlags::applied_to(const std::string& choice) {
+  std::string all = choice;
+  for (const BackendFlag& flag : backend_flags) {
+    const auto value = given.find(flag.key);
+    if (value == given.end() || choice.substr(0, choice.find(':')) != flag.backend) continue;
+    all += std::string(":") + flag.key + "=" + value->second;
+    ++used_[flag.key];
+  }
+  return all;
+}
+
+void BackendFlags::require_used() const {
+  for (const BackendFlag& flag : backend_flags)
+    if (given.count(flag.key) && !used_.count(flag.key))
+      refuse((std::string("--") + flag.key).c_str(), given.at(flag.key),
+             std::string("only with --backend ") + flag.backend);
+}
 
 std::vector<std::string> backend_choices() {
   std::vector<std::string> names = backend_names();

@@ -5,6 +5,9 @@
 #include "oracle/backend.hpp"
 #include "reference/error.hpp"
 
+#include <CLI/CLI.hpp>
+
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -15,6 +18,20 @@ namespace decant {
 class DeviceAbsent : public BackendError {
  public:
   using BackendError::BackendError;
+};
+
+/// Options of backends as flags of their own: --rebuild 10 is list:rebuild=10 for every list chosen.
+struct BackendFlags {
+  std::map<std::string, std::string> given;  // key, value
+
+  void add_to(CLI::App& verb);
+  /// The choice with the flags that its backend knows; counts each use.
+  std::string applied_to(const std::string& choice);
+  /// Throws InputError where a flag was given that no chosen backend knows.
+  void require_used() const;
+
+ private:
+  std::map<std::string, int> used_;
 };
 
 /// What --backend accepts: "reference" and the table of backends under test.

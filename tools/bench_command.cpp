@@ -24,6 +24,7 @@ namespace decant {
 namespace {
 
 struct BenchArguments {
+  BackendFlags flags;
   std::vector<std::string> fixtures, backends;
   std::string executor = "auto", json, report;
   int substeps = 0, windows = 5, refine = 0;
@@ -185,7 +186,7 @@ BenchRow time_backend(Backend& backend, const Fixture& fixture, const Walls& wal
   return row;
 }
 
-int bench(const BenchArguments& arguments) {
+int bench(BenchArguments& arguments) {
   check_output_place("--json", arguments.json);
   check_output_place("--report", arguments.report);
   std::vector<std::unique_ptr<Backend>> backends;
@@ -194,7 +195,9 @@ int bench(const BenchArguments& arguments) {
     names = backend_choices();
     if (arguments.executor == "cuda") std::erase(names, "reference");
   }
-  for (const auto& name : names) backends.push_back(choose_backend(name, arguments.executor));
+  for (const auto& name : names)
+    backends.push_back(choose_backend(arguments.flags.applied_to(name), arguments.executor));
+  arguments.flags.require_used();
   std::vector<std::filesystem::path> files(arguments.fixtures.begin(), arguments.fixtures.end());
   if (files.empty()) files = fixtures_in(fixture_folder(), false);
 
@@ -245,6 +248,7 @@ void add_bench_command(CLI::App& app, int& exit_status) {
       ->delimiter(',')
       ->allow_extra_args(false);
   verb->add_option("--executor", arguments->executor, "auto, cuda or host")->capture_default_str();
+  arguments->flags.add_to(*verb);
   verb->add_option("--substeps", arguments->substeps,
                    "substeps in a window; default: as many as take a tenth of a second")
       ->check(CLI::Range(1, 1000000));

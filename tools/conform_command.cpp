@@ -23,6 +23,7 @@ namespace decant {
 namespace {
 
 struct ConformArguments {
+  BackendFlags flags;
   std::vector<std::string> fixtures, backends;
   std::string executor = "auto", report;
   bool all = false, json = false, quiet = false;
@@ -65,7 +66,7 @@ Candidate candidate_of(const std::string& name, const std::string& executor) {
   return c;
 }
 
-std::vector<Candidate> candidates_of(const ConformArguments& arguments) {
+std::vector<Candidate> candidates_of(ConformArguments& arguments) {
   std::vector<std::string> names = arguments.backends;
   if (names.empty()) {
     names = backend_choices();
@@ -78,8 +79,9 @@ std::vector<Candidate> candidates_of(const ConformArguments& arguments) {
   for (const auto& name : names) {
     if (!seen.insert(name).second)
       throw InputError("command line", "--backend", name, "each backend once");
-    candidates.push_back(candidate_of(name, arguments.executor));
+    candidates.push_back(candidate_of(arguments.flags.applied_to(name), arguments.executor));
   }
+  arguments.flags.require_used();
   return candidates;
 }
 
@@ -184,7 +186,7 @@ std::string json_text(const Report& report, int status) {
   return all.dump(2);
 }
 
-int conform(const ConformArguments& arguments) {
+int conform(ConformArguments& arguments) {
   check_output_place("--report", arguments.report);
   auto candidates = candidates_of(arguments);
   const auto fixtures = fixtures_of(arguments);
@@ -222,6 +224,7 @@ void add_conform_command(CLI::App& app, int& exit_status) {
       ->delimiter(',')
       ->allow_extra_args(false);
   verb->add_option("--executor", arguments->executor, "auto, cuda or host")->capture_default_str();
+  arguments->flags.add_to(*verb);
   verb->add_option("--report", arguments->report, "write an HDF5 report");
   verb->add_flag("--json", arguments->json, "rows as JSON instead of the table");
   verb->add_flag("--quiet", arguments->quiet, "the verdict's line alone");

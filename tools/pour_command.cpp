@@ -21,6 +21,7 @@ namespace decant {
 namespace {
 
 struct PourArguments {
+  BackendFlags flags;
   std::string scene, out, backend = "reference", executor = "auto";
   std::optional<std::int64_t> particles, frames;
   std::uint32_t perturbation = 0;
@@ -160,9 +161,11 @@ void print(const PourResult& result, const BackendInfo& info, const Scene& scene
   fmt::print("\n");
 }
 
-int run(const PourArguments& arguments) {
+int run(PourArguments& arguments) {
   const Scene scene = scene_of(arguments);
-  const auto backend = choose_backend(arguments.backend, arguments.executor);
+  const auto backend =
+      choose_backend(arguments.flags.applied_to(arguments.backend), arguments.executor);
+  arguments.flags.require_used();
   const SignalGuard guard;
   PourOptions options;
   options.out = arguments.out;
@@ -197,6 +200,7 @@ void add_pour_command(CLI::App& app, int& exit_status) {
   command->add_option("--backend", a->backend, "reference, brute, …")
       ->capture_default_str();
   command->add_option("--executor", a->executor, "auto, cuda or host")->capture_default_str();
+  a->flags.add_to(*command);
   command->add_option("--particles", a->particles,
                       "About this many; spacing and all that follows are derived anew");
   command->add_option("--frames", a->frames,
