@@ -36,16 +36,12 @@ struct BruteQuery {
   template <class Team, class Visit>
   DECANT_DEVICE void of_segment(Team& team, int k, Float3 x, const float4*, Visit&& visit) const {
     const WallSegment& s = segments[k];
-    sweep(team, squares, base + s.begin, base + padded_end(s.end), x,
+    sweep(team, squares, base + s.begin, base + padded(s.end), x,
           [&](int b, Float3 d, float r2) { visit(b, float4{}, d, r2); });
   }
 
  private:
   static constexpr int batch = 16;
-
-  DECANT_DEVICE static int padded_end(int end) {
-    return (end + tile_size - 1) / tile_size * tile_size;
-  }
 
   template <class Team, class Visit>
   DECANT_DEVICE void sweep(Team& team, const float4* all, int begin, int end, Float3 x,
@@ -94,7 +90,7 @@ class BruteSearch {
         const WallSegment& s = walls.segments[k];
         queue.for_each_tile_team(s.end - s.begin,
                                  VolumePass<Query>{c_, a, query<Query>(a), walls.walls,
-                                                   static_cast<int>(k), s.begin, walls.volume});
+                                                   static_cast<int>(k), s.begin});
       });
   }
   void arrange(Arrays& a, const Particles& state, const Particles&) const {

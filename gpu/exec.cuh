@@ -61,7 +61,7 @@ DECANT_DEVICE float lesser(float a, float b) {
 /// Particles of a team's tile; arrays that tiles are cut from are padded to a multiple of it.
 inline constexpr int tile_size = 256;
 
-inline int padded(int n) { return (n + tile_size - 1) / tile_size * tile_size; }
+DECANT_BOTH int padded(int n) { return (n + tile_size - 1) / tile_size * tile_size; }
 
 /// Device memory of n elements, freed with the object.
 template <class T>

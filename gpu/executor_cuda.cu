@@ -1,20 +1,8 @@
 /// \file
 /// Every backend on the CUDA executor.
-#include "gpu/brute_force.cuh"
-#include "gpu/device_solver.hpp"
-#include "gpu/grid_search.cuh"
+#include "gpu/backends.cuh"
 
 namespace decant::gpu::cuda {
-
-std::unique_ptr<DeviceSolver> make_brute(const SolverOptions& options) {
-  return std::make_unique<Pipeline<BruteSearch>>(options);
-}
-std::unique_ptr<DeviceSolver> make_hash(const SolverOptions& options) {
-  return std::make_unique<Pipeline<HashSearch>>(options);
-}
-std::unique_ptr<DeviceSolver> make_list(const SolverOptions& options) {
-  return std::make_unique<Pipeline<ListSearch>>(options);
-}
 
 std::string device(std::string* why_not) {
   int count = 0;

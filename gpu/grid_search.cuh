@@ -5,7 +5,7 @@
 /// hash: every substep sorts the fluid into cells; the density pass tests the cells around and writes
 /// what it finds into lists for the force pass (or, `pairs=rescan`, the force pass tests cells again).
 /// list: lists reach to H and a skin; the sort and the lists are made when a trigger asks for it,
-/// decided on the device. The density of such a substep is found while its lists are made.
+/// decided on the device.
 #pragma once
 
 #include "gpu/grid_sources.cuh"
@@ -42,7 +42,6 @@ class GridSearch {
                               : static_cast<int>(std::ceil(41 * ratio * ratio * ratio / lanes_));
       if (!o_.capacity && lanes_ > 1) capacity_ += 4;
     }
-    lists_.resize(0);
     reserve_lists();
   }
 
@@ -75,7 +74,7 @@ class GridSearch {
     else
       build<periodic>(queue, a, geometry, laps);
     if (keeps_pairs())
-      run<periodic, facts>(queue, a, out, ListQuery<periodic>{c_, lists(), a.base});
+      run<periodic, facts>(queue, a, out, ListQuery<periodic>{{c_, a.base}, lists()});
     else
       run<periodic, facts>(queue, a, out, cell_query<periodic>(a));
     laps.density();
@@ -86,7 +85,7 @@ class GridSearch {
     with_lanes(lanes_, [&](auto lanes) {
       if (keeps_pairs())
         force_by<decltype(lanes)::value, facts>(queue, a, out,
-                                                ListQuery<periodic>{c_, lists(), a.base});
+                                                ListQuery<periodic>{{c_, a.base}, lists()});
       else
         force_by<decltype(lanes)::value, facts>(queue, a, out, cell_query<periodic>(a));
     });
@@ -120,7 +119,6 @@ class GridSearch {
   bool grow(int longest) {
     if (longest <= capacity_) return false;
     capacity_ = longest + 4;
-    lists_.resize(0);
     reserve_lists();
     return true;
   }
@@ -141,7 +139,7 @@ class GridSearch {
   void prepare_fluid(const std::vector<float>& positions, int containers) {
     const auto n = static_cast<std::size_t>(n_);
     double low[3], high[3];
-    bounds(positions, 0, positions.size(), low, high);
+    bounds(positions, low, high);
     for (int a = 0; a < 3; ++a) {
       // What falls out of a cup stays within a few times its size, if it stays in the domain.
       const double most = 3 * (high[a] - low[a]) + 16.0 * reach_;
@@ -164,7 +162,7 @@ class GridSearch {
     const auto total = static_cast<std::size_t>(walls_.padded_total());
     wall_from_.resize(total);
     wall_from_id_.resize(total);
-    queue.copy(wall_from_.get(), walls_.local, total * sizeof(float4));
+    queue.copy(wall_from_.get(), walls_.walls.local, total * sizeof(float4));
     queue.copy(wall_from_id_.get(), walls_.walls.id, total * sizeof(int));
     for (std::size_t k = 0; k < walls_.segments.size(); ++k) {
       WallSegment& s = walls_.segments[k];
@@ -192,7 +190,7 @@ class GridSearch {
         const WallSegment& s = walls_.segments[k];
         queue.for_each_group<tile_lanes>(
             s.end - s.begin, VolumePass<CellQuery<p>>{c_, a, cell_query<p>(a), walls_.walls,
-                                                      static_cast<int>(k), s.begin, walls_.volume});
+                                                      static_cast<int>(k), s.begin});
       });
     bool any = false;
     for (std::size_t k = 0; k < walls_.segments.size(); ++k) {
@@ -217,7 +215,7 @@ class GridSearch {
     auto& near = *near_.emplace_back(std::make_unique<Buffer<int>>());
     with_periodic(c_, [&](auto periodic) {
       using Pass = NearPass<decltype(periodic)::value>;
-      Pass pass{s.table, a.base + s.begin, s.begin, walls_.local, {0, 0, 0}, reach_ * reach_,
+      Pass pass{s.table, a.base + s.begin, s.begin, walls_.walls.local, {0, 0, 0}, reach_ * reach_,
                 count.get(), nullptr, nullptr};
       const float low[3] = {s.low.x, s.low.y, s.low.z}, high[3] = {s.high.x, s.high.y, s.high.z};
       bool side_by_side = !c_.any_periodic;
@@ -251,7 +249,7 @@ class GridSearch {
   }
 
   FrameWallSource frame_source(const WallSegment& s) const {
-    return {wall_from_.get() + s.begin, wall_from_id_.get() + s.begin, walls_.local + s.begin,
+    return {wall_from_.get() + s.begin, wall_from_id_.get() + s.begin, walls_.walls.local + s.begin,
             walls_.walls.id + s.begin};
   }
 
@@ -325,7 +323,7 @@ class GridSearch {
   }
   template <bool periodic>
   CellQuery<periodic> cell_query(const Arrays& a) const {
-    return {c_, candidates(a), a};
+    return {{c_, a.base}, candidates(a), a};
   }
   Lists lists() const {
     return {lists_.get(), lanes_, static_cast<unsigned>(n_) * static_cast<unsigned>(lanes_),
@@ -336,7 +334,6 @@ class GridSearch {
     if (!reuses_) return {};
     return {!automatic ? Trigger::every : local && sort_fluid_ ? Trigger::local : Trigger::global,
             o_.rebuild,
-            c_.H,
             moving_bits(),
             origin_.get(),
             built_.get(),
@@ -347,6 +344,7 @@ class GridSearch {
   }
 
   void reserve_lists() {
+    lists_.resize(0);  // before the larger ones take their room
     if (!keeps_pairs()) return;
     lists_.resize(static_cast<std::size_t>(capacity_ * lanes_) * static_cast<std::size_t>(n_));
     counts_.resize(static_cast<std::size_t>(lanes_) * static_cast<std::size_t>(n_));
@@ -358,15 +356,15 @@ class GridSearch {
       if (walls_.moves[k]) bits |= 1u << k;
     return bits;
   }
-  static void bounds(const std::vector<float>& rows, std::size_t from, std::size_t to,
-                     double low[3], double high[3]) {
-    for (int a = 0; a < 3; ++a) low[a] = high[a] = from < to ? rows[from + static_cast<std::size_t>(a)] : 0;
-    for (std::size_t k = from; k < to; ++k) {
+  static void bounds(const std::vector<float>& rows, double low[3], double high[3]) {
+    for (std::size_t a = 0; a < 3; ++a) low[a] = high[a] = rows.empty() ? 0 : rows[a];
+    for (std::size_t k = 0; k < rows.size(); ++k) {
       const double x = rows[k];
       if (x < low[k % 3]) low[k % 3] = x;
       if (x > high[k % 3]) high[k % 3] = x;
     }
   }
+
   // Bounds of a skin that is chosen here, and what lists are first made for; shares of H.
   static constexpr double narrowest = 0.08, usual = 0.2, widest = 0.3;
 

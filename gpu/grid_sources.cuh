@@ -9,14 +9,6 @@
 
 namespace decant::gpu::DECANT_EXECUTOR {
 
-/// Watch::origin of a particle that is at x when lists are made.
-DECANT_DEVICE float4 origin_at(const Constants& c, const Arrays& a, const DeviceGeometry& geometry,
-                               float4 x) {
-  const float skin = sound_skin(a.mailbox->skin);
-  const float far = clearance(c, geometry, a.poses_now(), xyz(x)) - c.H;
-  return make_float4(x.x, x.y, x.z, far > skin ? far : skin);
-}
-
 /// Fluid on its way into the order of its cells.
 struct FluidSource {
   Constants c;
@@ -41,10 +33,16 @@ struct FluidSource {
     into.position[to] = x;
     into.velocity[to] = from.velocity[i];
     a.id[to] = id;
+    note(to, in_bucket, x);
+  }
+  /// What there is to remember of the build.
+  DECANT_DEVICE void note(int to, int in_bucket, float4 x) const {
     bucket[to] = in_bucket;
     if (!origin) return;
     const DevicePose* poses = a.poses_now();
-    origin[to] = origin_at(c, a, geometry, x);
+    const float skin = sound_skin(a.mailbox->skin);
+    const float far = clearance(c, geometry, poses, xyz(x)) - c.H;
+    origin[to] = make_float4(x.x, x.y, x.z, far > skin ? far : skin);
     if (to < a.containers) built[to] = poses[to];
   }
 };
@@ -89,11 +87,7 @@ struct StayPass {
   FluidSource source;
   DECANT_DEVICE void operator()(int i) const {
     if (i == 0) source.begin();
-    const float4 x = source.from.position[i];
-    const DevicePose* poses = source.a.poses_now();
-    source.bucket[i] = 0;
-    source.origin[i] = origin_at(source.c, source.a, source.geometry, x);
-    if (i < source.a.containers) source.built[i] = poses[i];
+    source.note(i, 0, source.from.position[i]);
   }
 };
 

@@ -204,8 +204,6 @@ class Pipeline : public DeviceSolver {
     wall_id_.upload(ids);
     wall_container_.upload(containers);
     wall_volume_.resize(static_cast<std::size_t>(m_));
-    wall_store_.local = wall_local_.get();
-    wall_store_.volume = wall_volume_.get();
     wall_store_.walls = {wall_local_.get(), wall_id_.get(), wall_container_.get(),
                          wall_volume_.get(), Search::points_carry_square};
   }
@@ -243,7 +241,7 @@ class Pipeline : public DeviceSolver {
   void begin() {
     mailbox_.upload({Mailbox{~0ull, ~0ull, 0, 0, 0, 1, 0.0f, 0}});
     const Arrays a = arrays();
-    queue_.for_each(wall_store_.padded_total(), PosePass{a, wall_store_.walls, 0, true});
+    queue_.for_each(wall_store_.padded_total(), PosePass{a, wall_store_.walls, 0});
     search_.begin(queue_, a);
   }
 

@@ -85,9 +85,19 @@ struct Candidates {
   }
 };
 
-template <bool periodic>
-struct CellQuery {
+/// What points carry as their fourth component is what a pass needs of them.
+struct FullPoints {
   Constants c;
+  int base;
+
+  DECANT_DEVICE float weight(int j, float4 other) const {
+    return j < base ? c.mass : c.rest_density * other.w;
+  }
+  DECANT_DEVICE float pressure_term(int, float4 other) const { return other.w; }
+};
+
+template <bool periodic>
+struct CellQuery : FullPoints {
   Candidates candidates;
   Arrays a;
 
@@ -98,11 +108,6 @@ struct CellQuery {
       test<Team::lanes>(i, x, points, run, visit);
     });
   }
-  DECANT_DEVICE float weight(int j, float4 other) const {
-    return j < candidates.base ? c.mass : c.rest_density * other.w;
-  }
-  DECANT_DEVICE float pressure_term(int, float4 other) const { return other.w; }
-
   template <class Team, class Visit>
   DECANT_DEVICE void of_segment(Team& team, int k, Float3 x, const float4* points,
                                 Visit&& visit) const {
@@ -113,7 +118,7 @@ struct CellQuery {
 
  private:
   template <int lanes, class Visit>
-  DECANT_DEVICE void test([[maybe_unused]] int i, Float3 x, const float4* points, Candidates::Run run,
+  DECANT_DEVICE void test(int i, Float3 x, const float4* points, Candidates::Run run,
                           Visit&& visit) const {
     for (int k = run.begin; k < run.end; k += run.listed ? lanes : 1) {
       const int j = run.listed ? read_only(run.listed + k) : k;
@@ -216,10 +221,8 @@ struct CollectPass {
 };
 
 template <bool periodic>
-struct ListQuery {
-  Constants c;
+struct ListQuery : FullPoints {
   Lists lists;
-  int base;
 
   template <class Team, class Visit>
   DECANT_DEVICE void each(Team& team, int i, Float3 x, const float4* points, Visit&& visit) const {
@@ -246,10 +249,6 @@ struct ListQuery {
       }
     }
   }
-  DECANT_DEVICE float weight(int j, float4 other) const {
-    return j < base ? c.mass : c.rest_density * other.w;
-  }
-  DECANT_DEVICE float pressure_term(int, float4 other) const { return other.w; }
 };
 
 }  // namespace decant::gpu::DECANT_EXECUTOR

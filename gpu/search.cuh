@@ -17,14 +17,12 @@ struct WallStore {
   std::vector<WallSegment> segments;  // tables and bounds are the search's to fill
   std::vector<bool> moves;
   Walls walls;
-  float4* local;  // where Walls::local points
-  float* volume;  // where Walls::volume points
 
   int padded_total() const { return segments.empty() ? 0 : padded(segments.back().end); }
   /// Slots [first, first + moving_count) hold all that moves.
   int first_moving = 0, moving_end = 0;
   int moving_count() const { return moving_end - first_moving; }
-  PosePass moving(const Arrays& a) const { return {a, walls, first_moving, true}; }
+  PosePass moving(const Arrays& a) const { return {a, walls, first_moving}; }
 };
 
 /// Stage times, where they are wanted.

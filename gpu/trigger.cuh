@@ -72,7 +72,6 @@ struct SkinPass {
 struct Watch {
   Trigger trigger;
   int interval;              // substeps, of Trigger::every
-  float H;
   unsigned moving;           // bit k: container k moves; those from 32 on are taken to
   const float4* origin;      // x, y, z at the build; what it may move against a wall
   const DevicePose* built;   // poses at the build
@@ -102,7 +101,7 @@ struct WatchParticle {
     const Float3 d = nearest_image<periodic>(c, x - from);
     // What rounding may add to a way is taken off beforehand.
     const float skin = sound_skin(a.mailbox->skin);
-    const float farthest = w.trigger == Trigger::local ? 0.5f * w.H + skin : 0.5f * skin;
+    const float farthest = w.trigger == Trigger::local ? 0.5f * c.H + skin : 0.5f * skin;
     bool stale = !(dot(d, d) <= farthest * farthest);
     const float slack = w.origin[i].w;
     const DevicePose* poses = a.poses_at_end();

@@ -23,10 +23,10 @@ struct WallSegment {
 
 /// Slots of all containers, each padded to whole tiles; an id of −1 is padding.
 struct Walls {
-  const float4* local;     // container frame
+  float4* local;           // container frame
   int* id;
   const int* container;
-  const float* volume;     // V_b by id
+  float* volume;           // V_b by id
   bool square;             // positions carry |x|² instead of V_b
 };
 
@@ -39,17 +39,16 @@ DECANT_DEVICE void place_wall(const Arrays& a, const Walls& w, int slot, Float3 
   a.motion[a.base + slot] = make_float4(v.x, v.y, v.z, volume);
 }
 
-/// Wall particles to their place in the world.
+/// Wall particles to their place in the world at the end of the substep under way, or before the first.
 struct PosePass {
   Arrays a;
   Walls walls;
   int first;
-  bool at_end;  // of the substep under way
 
   DECANT_DEVICE void operator()(int k) const {
     const int slot = first + k, id = walls.id[slot];
     if (id < 0) return;
-    const DevicePose& pose = (at_end ? a.poses_at_end() : a.poses_now())[walls.container[slot]];
+    const DevicePose& pose = a.poses_at_end()[walls.container[slot]];
     place_wall(a, walls, slot, rotate(pose, xyz(walls.local[slot])) + pose.translation, id, pose);
   }
 };
@@ -71,7 +70,6 @@ struct VolumePass {
   Query query;
   Walls walls;
   int container, begin;  // its first slot
-  float* volume;
 
   template <class Team>
   DECANT_DEVICE void operator()(Team& team, int k, bool active) const {
@@ -80,7 +78,7 @@ struct VolumePass {
     query.of_segment(team, container, xyz(a.now.position[a.base + slot]), a.now.position,
                      [&](int, float4, Float3, float r2) DECANT_INLINE { sum += kernel_w(c, radius(r2)); });
     sum = team.sum(sum);
-    if (active && team.leads()) volume[walls.id[slot]] = 1.0f / sum;
+    if (active && team.leads()) walls.volume[walls.id[slot]] = 1.0f / sum;
   }
 };
 

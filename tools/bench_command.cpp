@@ -165,11 +165,10 @@ BenchRow time_backend(Backend& backend, const Fixture& fixture, const Walls& wal
 
   const StageTimes& s = middle.stages;
   row.tells_stages = s.force.calls > 0;
-  // Where not every substep builds, those that build find their densities meanwhile.
+  // Not every substep of a list builds.
   const double substeps = static_cast<double>(middle.substeps);
   const double builds = middle.rebuilds > 0 ? static_cast<double>(middle.rebuilds) / substeps : 1;
-  const double reuses = builds < 1 ? 1 - builds : 1;
-  row.stages_us = {builds * each_us(s.build), reuses * each_us(s.density), each_us(s.force),
+  row.stages_us = {builds * each_us(s.build), each_us(s.density), each_us(s.force),
                    each_us(s.integrate), 0};
   double named = 0;
   for (const double stage : row.stages_us) named += stage;
@@ -208,8 +207,10 @@ int bench(BenchArguments& arguments) {
     const Fixture fixture = read_fixture(file);
     const Judgement oracle = prepare(fixture);
     for (const auto& backend : backends) {
+      const BackendInfo info = backend->info();
+      const std::string label = backend_label(info.name, info.options);
       if (const std::string why = objection(*backend, fixture, oracle); !why.empty()) {
-        fmt::print("{:<22} does not conform, is not timed: {}\n", backend->info().name, why);
+        fmt::print("{:<28} does not conform, is not timed: {}\n", label, why);
         status = exit_does_not_conform;
         continue;
       }
@@ -221,9 +222,7 @@ int bench(BenchArguments& arguments) {
           rows.push_back(time_backend(*backend, fixture, oracle.walls, arguments));
         }
       } catch (const BackendError& error) {
-        const BackendInfo info = backend->info();
-        fmt::print("{:<28} breaks down, is not timed: {}\n",
-                   info.name + (info.options.empty() ? "" : ":" + info.options), error.what());
+        fmt::print("{:<28} breaks down, is not timed: {}\n", label, error.what());
         status = exit_failure;
         continue;
       }

@@ -51,6 +51,10 @@ nlohmann::ordered_json to_json(const BenchRow& row) {
 
 }  // namespace
 
+std::string backend_label(const std::string& name, const std::string& options) {
+  return name + (options.empty() ? "" : ":" + options);
+}
+
 std::string bench_heading() {
   return fmt::format("{:<28} {:<9} {:>9} {:<10} {:>11} {:>9} {:>8} {:>7}  {}", "backend", "executor",
                      "particles", "window", "us/substep", "particle", "rebuilt", "bytes",
@@ -64,7 +68,7 @@ std::string to_text(const BenchRow& row) {
     for (std::size_t s = 0; s < bench_stage_names.size(); ++s)
       stages += fmt::format(" {} {:.1f}", bench_stage_names[s], row.stages_us[s]);
   return fmt::format("{:<28} {:<9} {:>9} {:<10} {:>11.2f} {:>9.3g} {:>8} {:>7} {}",
-                     row.backend + (row.options.empty() ? "" : ":" + row.options), row.executor,
+                     backend_label(row.backend, row.options), row.executor,
                      row.particles, row.window, row.substep_us, row.particle_substeps_per_s(),
                      row.substeps_per_rebuild > 0 ? fmt::format("{:.2f}", row.substeps_per_rebuild)
                                                   : "-",

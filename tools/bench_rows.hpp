@@ -9,8 +9,7 @@
 
 namespace decant {
 
-/// Times of a substep by stage, µs. A list's build is spread over the substeps that reuse it, and
-/// holds the density pass of the substeps that build.
+/// Times of a substep by stage, µs. A list's build is spread over the substeps that reuse it.
 inline constexpr std::array<const char*, 5> bench_stage_names = {"build", "density", "force",
                                                                  "integrate", "other"};
 
@@ -33,6 +32,9 @@ struct BenchRow {
     return static_cast<double>(particles) / substep_us * 1e6;
   }
 };
+
+/// NAME or NAME:OPTIONS, as --backend takes it.
+std::string backend_label(const std::string& name, const std::string& options);
 
 /// Heading of the console's table, and a line of it.
 std::string bench_heading();
