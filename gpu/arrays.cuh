@@ -28,6 +28,7 @@ struct Mailbox {
 struct Arrays {
   int n;             // fluid particles
   int base;          // where wall particles begin in the arrays below; n, rounded up to whole tiles
+  int ghost;         // after all others, a point far from everything
   Particles now;     // where the substep begins, in the order in which passes run
   Particles next;    // where it ends, same order
   int* id;           // of each, same order

@@ -5,7 +5,8 @@
 /// What costs is the test of a pair. |x_i − x_j|² < H² is first asked as w_j − 2 x_i·x_j < H² − |x_i|²
 /// with w_j = |x_j|² stored beside the point: three multiply-adds. That form cancels, so its bound is
 /// widened by what fp32 can lose, 16u(|x_i| + H)², and what passes is asked again exactly; the filter
-/// never decides. Sixteen pairs share one branch, because hits are rare (one in thousands).
+/// never decides. Pairs of a batch share one branch, because hits are rare (one in thousands), and batches
+/// with a hit are put off: threads then evaluate theirs together instead of waiting for each other.
 #pragma once
 
 #include "gpu/pipeline.cuh"
@@ -22,9 +23,10 @@ struct BruteQuery {
   const WallSegment* segments;
 
   template <class Team, class Visit>
-  DECANT_DEVICE void each(Team& team, int i, Float3 x, const float4*, Visit&& visit) const {
-    sweep(team, squares, 0, all_end, x, [&](int j, Float3 d, float r2) {
-      if (j != i) visit(j, float4{}, d, r2);
+  DECANT_DEVICE void each(Team& team, const Float3 (&x)[Team::held], const float4*,
+                          Visit&& visit) const {
+    sweep(team, squares, 0, all_end, x, [&](int k, int j, Float3 d, float r2) DECANT_INLINE {
+      if (j != team.particle(k)) visit(k, j, float4{}, d, r2);
     });
   }
   /// What points carry is |x|²; the rest is fetched for the few that are near.
@@ -34,39 +36,72 @@ struct BruteQuery {
   DECANT_DEVICE float pressure_term(int j, float4) const { return with_pressure[j].w; }
 
   template <class Team, class Visit>
-  DECANT_DEVICE void of_segment(Team& team, int k, Float3 x, const float4*, Visit&& visit) const {
-    const WallSegment& s = segments[k];
+  DECANT_DEVICE void of_segment(Team& team, int container, const Float3 (&x)[Team::held],
+                                const float4*, Visit&& visit) const {
+    const WallSegment& s = segments[container];
     sweep(team, squares, base + s.begin, base + padded(s.end), x,
-          [&](int b, Float3 d, float r2) { visit(b, float4{}, d, r2); });
+          [&](int k, int, Float3, float r2) DECANT_INLINE { visit(k, r2); });
   }
 
  private:
   static constexpr int batch = 16;
+  static constexpr int a_tile = tile_points / (batch * tile_lanes) * tile_held;  // batches a thread has
+  static constexpr int room = 2 * a_tile;
 
   template <class Team, class Visit>
-  DECANT_DEVICE void sweep(Team& team, const float4* all, int begin, int end, Float3 x,
-                           Visit&& visit) const {
-    const float squared = dot(x, x), reach = sqrtf(squared) + c.H;
-    const float bound = c.H2 - squared + 16.0f * 0x1p-24f * (reach * reach);
-    const Float3 back = -2.0f * x;
-    team.tiles(all, begin, end, [&](int first, const float4* tile) {
-      for (int k = team.lane(); k < tile_size; k += batch * tile_lanes) {
-        if constexpr (!periodic) {
-          float least = 3.0e38f;
+  DECANT_DEVICE void sweep(Team& team, const float4* all, int begin, int end,
+                           const Float3 (&x)[Team::held], Visit&& visit) const {
+    float bound[Team::held];
+    Float3 back[Team::held];
 #pragma unroll
-          for (int s = 0; s < batch; ++s) {
-            const float4 p = tile[k + s * tile_lanes];
-            least = lesser(back.x * p.x + (back.y * p.y + (back.z * p.z + p.w)), least);
+    for (int k = 0; k < Team::held; ++k) {
+      const float squared = dot(x[k], x[k]), reach = sqrtf(squared) + c.H;
+      bound[k] = c.H2 - squared + 16.0f * 0x1p-24f * (reach * reach);
+      back[k] = -2.0f * x[k];
+    }
+    int put_off[room];  // first point × held + k
+    int waiting = 0;
+#pragma unroll 1
+    for (int first = begin;; first += tile_points) {
+      if (first >= end || waiting > room - a_tile) {
+#pragma unroll 1
+        for (; waiting > 0; --waiting) {
+          const int k = put_off[waiting - 1] % Team::held, from = put_off[waiting - 1] / Team::held;
+#pragma unroll 1
+          for (int j = from; j < from + batch * tile_lanes && j < end; j += tile_lanes) {
+            const Float3 d = nearest_image<periodic>(c, x[k] - xyz(read_only(all + j)));
+            const float r2 = dot(d, d);
+            if (r2 < c.H2) visit(k, j, d, r2);
           }
-          if (!(least < bound)) continue;
-        }
-        for (int s = 0; s < batch; ++s) {
-          const Float3 d = nearest_image<periodic>(c, x - xyz(tile[k + s * tile_lanes]));
-          const float r2 = dot(d, d);
-          if (r2 < c.H2) visit(first + k + s * tile_lanes, d, r2);
         }
       }
-    });
+      if (first >= end) break;
+      const float4* tile = team.tile(all, first, end);
+      const int points = end - first < tile_points ? end - first : tile_points;
+#pragma unroll 1
+      for (int at = team.lane(); at < points; at += batch * tile_lanes) {
+        float least[Team::held];
+#pragma unroll
+        for (int k = 0; k < Team::held; ++k) least[k] = periodic ? bound[k] - 1.0f : 3.0e38f;
+        if constexpr (!periodic) {
+#pragma unroll
+          for (int s = 0; s < batch; ++s) {
+            const float4 p = tile[at + s * tile_lanes];
+#pragma unroll
+            for (int k = 0; k < Team::held; ++k)
+              least[k] = lesser(back[k].x * p.x + (back[k].y * p.y + (back[k].z * p.z + p.w)),
+                                least[k]);
+          }
+        }
+        bool any = false;
+#pragma unroll
+        for (int k = 0; k < Team::held; ++k) any = any || least[k] < bound[k];
+        if (!any) continue;
+#pragma unroll
+        for (int k = 0; k < Team::held; ++k)
+          if (least[k] < bound[k]) put_off[waiting++] = (first + at) * Team::held + k;
+      }
+    }
   }
 };
 

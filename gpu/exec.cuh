@@ -39,8 +39,12 @@ struct alignas(16) float4 {
 struct alignas(8) int2 {
   int x, y;
 };
+struct alignas(16) int4 {
+  int x, y, z, w;
+};
 inline float4 make_float4(float x, float y, float z, float w) { return {x, y, z, w}; }
 inline int2 make_int2(int x, int y) { return {x, y}; }
+inline int4 make_int4(int x, int y, int z, int w) { return {x, y, z, w}; }
 using ::fabsf;
 using ::fmaxf;
 using ::fminf;
@@ -55,6 +59,22 @@ DECANT_DEVICE float lesser(float a, float b) {
   return fminf(a, b);
 #else
   return a < b ? a : b;
+#endif
+}
+
+DECANT_DEVICE int bits_in(unsigned mask) {
+#ifdef __CUDACC__
+  return __popc(mask);
+#else
+  return __builtin_popcount(mask);
+#endif
+}
+/// Number of the lowest bit set; mask is not 0.
+DECANT_DEVICE int lowest_bit(unsigned mask) {
+#ifdef __CUDACC__
+  return __ffs(static_cast<int>(mask)) - 1;
+#else
+  return __builtin_ctz(mask);
 #endif
 }
 
@@ -85,6 +105,10 @@ class Buffer {
   void upload(const std::vector<T>& from) {
     if (size_ < from.size()) resize(from.size());
     copy_in(data_, from.data(), from.size() * sizeof(T));
+  }
+  /// From element `first` on, where there is room.
+  void upload_at(std::size_t first, const std::vector<T>& from) {
+    copy_in(data_ + first, from.data(), from.size() * sizeof(T));
   }
   std::vector<T> download(std::size_t n) const {
     std::vector<T> to(n);

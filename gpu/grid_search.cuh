@@ -8,9 +8,9 @@
 /// decided on the device.
 #pragma once
 
+#include "gpu/collect.cuh"
 #include "gpu/grid_sources.cuh"
 #include "gpu/pipeline.cuh"
-#include "gpu/queries.cuh"
 
 #include <algorithm>
 #include <cmath>
@@ -31,10 +31,10 @@ class GridSearch {
     widest_skin_ = !reuses_ ? 0.0f : static_cast<float>(o_.skin < 0 ? widest : o_.skin) * c.H;
     reach_ = c.H + widest_skin_;
 #ifdef __CUDACC__
-    lanes_ = o_.lanes ? o_.lanes : n_ < 300000 ? 2 : 1;
+    lanes_ = o_.lanes ? o_.lanes : reuses_ || !large() ? 2 : 1;
 #endif
     sort_fluid_ = !(reuses_ && o_.build == SolverOptions::Build::all_pairs);
-    prepare_fluid(positions, a.containers);
+    prepare_fluid(queue, positions, a.containers);
     prepare_walls(queue, a);
     if (capacity_ == 0) {
       const double ratio = !reuses_ ? 1 : 1 + (o_.skin < 0 ? usual : o_.skin);
@@ -74,7 +74,7 @@ class GridSearch {
     else
       build<periodic>(queue, a, geometry, laps);
     if (keeps_pairs())
-      run<periodic, facts>(queue, a, out, ListQuery<periodic>{{c_, a.base}, lists()});
+      run<periodic, facts>(queue, a, out, ListQuery<periodic>{{c_, a.base}, lists(a)});
     else
       run<periodic, facts>(queue, a, out, cell_query<periodic>(a));
     laps.density();
@@ -85,7 +85,7 @@ class GridSearch {
     with_lanes(lanes_, [&](auto lanes) {
       if (keeps_pairs())
         force_by<decltype(lanes)::value, facts>(queue, a, out,
-                                                ListQuery<periodic>{{c_, a.base}, lists()});
+                                                ListQuery<periodic>{{c_, a.base}, lists(a)});
       else
         force_by<decltype(lanes)::value, facts>(queue, a, out, cell_query<periodic>(a));
     });
@@ -126,18 +126,19 @@ class GridSearch {
   std::size_t bytes() const {
     std::size_t sum = fluid_.bytes() + scratch_.bytes() + bucket_.bytes() + lists_.bytes() +
                       counts_.bytes() + origin_.bytes() + built_.bytes() + boxes_.bytes() +
-                      segments_.bytes() + wall_from_.bytes() + wall_from_id_.bytes();
+                      segments_.bytes() + wall_from_.bytes() + wall_from_id_.bytes() + wall_room_.bytes();
     for (const auto& grid : wall_grids_) sum += grid->bytes();
     for (const auto& near : near_) sum += near->bytes();
     return sum;
   }
 
  private:
+  /// From here on a particle's bytes count more than how long a warp waits, and few are near walls.
+  bool large() const { return n_ >= 300000; }
   bool keeps_pairs() const { return reuses_ || o_.pairs == SolverOptions::Pairs::keep; }
   bool walls_have_cells() const { return reuses_ ? sort_fluid_ : o_.grid == SolverOptions::Grid::all; }
 
-  void prepare_fluid(const std::vector<float>& positions, int containers) {
-    const auto n = static_cast<std::size_t>(n_);
+  void prepare_fluid(Queue& queue, const std::vector<float>& positions, int containers) {
     double low[3], high[3];
     bounds(positions, low, high);
     for (int a = 0; a < 3; ++a) {
@@ -147,12 +148,13 @@ class GridSearch {
       high[a] = low[a] + std::min(most, domain);
     }
     const CellTable table =
-        make_cell_table(c_, reach_, low, high, std::max(4096.0, 5.0 * n_));
-    fluid_.prepare(table, n_, scratch_);
-    bucket_.resize(n);
+        make_cell_table(c_, reach_, low, high, std::max(4096.0, (large() ? 2.5 : 5.0) * n_));
+    fluid_.prepare(queue, table, n_, scratch_);
     if (!reuses_) return;
-    origin_.resize(n);
+    origin_.resize(static_cast<std::size_t>(n_));
     built_.resize(static_cast<std::size_t>(containers));
+    if (watch().trigger != Trigger::local) return;
+    bucket_.resize(static_cast<std::size_t>(n_));
     boxes_.resize(2 * static_cast<std::size_t>(table.supers()));
   }
 
@@ -162,6 +164,7 @@ class GridSearch {
     const auto total = static_cast<std::size_t>(walls_.padded_total());
     wall_from_.resize(total);
     wall_from_id_.resize(total);
+    wall_room_.resize(total);
     queue.copy(wall_from_.get(), walls_.walls.local, total * sizeof(float4));
     queue.copy(wall_from_id_.get(), walls_.walls.id, total * sizeof(int));
     for (std::size_t k = 0; k < walls_.segments.size(); ++k) {
@@ -169,11 +172,11 @@ class GridSearch {
       const int count = s.end - s.begin;
       const double low[3] = {s.low.x, s.low.y, s.low.z}, high[3] = {s.high.x, s.high.y, s.high.z};
       auto& grid = *wall_grids_.emplace_back(std::make_unique<CellSort>());
-      grid.prepare(make_cell_table(c_, reach_, low, high, std::max(4096.0, 4.0 * count)), count,
-                   scratch_);
+      grid.prepare(queue, make_cell_table(c_, reach_, low, high, std::max(4096.0, 4.0 * count)),
+                   count, scratch_);
       grid.counting(queue, count, frame_source(s), scratch_);
       s.table = grid.table();
-      if (!rebuilt(k)) find_near(queue, a, s);
+      if (!rebuilt(k) && !large()) find_near(queue, a, s);
       s.in_world = false;
       const float margin = 1.001f * reach_, far = 3.0e38f;
       const auto out = [&](int axis, float x, float by) {
@@ -188,7 +191,7 @@ class GridSearch {
       with_periodic(c_, [&](auto periodic) {
         constexpr bool p = decltype(periodic)::value;
         const WallSegment& s = walls_.segments[k];
-        queue.for_each_group<tile_lanes>(
+        queue.for_each_group<4>(
             s.end - s.begin, VolumePass<CellQuery<p>>{c_, a, cell_query<p>(a), walls_.walls,
                                                       static_cast<int>(k), s.begin});
       });
@@ -206,6 +209,7 @@ class GridSearch {
     if (any) return;
     wall_from_.resize(0);
     wall_from_id_.resize(0);
+    wall_room_.resize(0);
   }
 
   void find_near(Queue& queue, const Arrays& a, WallSegment& s) {
@@ -250,7 +254,7 @@ class GridSearch {
 
   FrameWallSource frame_source(const WallSegment& s) const {
     return {wall_from_.get() + s.begin, wall_from_id_.get() + s.begin, walls_.walls.local + s.begin,
-            walls_.walls.id + s.begin};
+            walls_.walls.id + s.begin, wall_room_.get() + s.begin};
   }
 
   void rebuild_walls(Queue& queue, const Arrays& a) {
@@ -301,7 +305,7 @@ class GridSearch {
     const Particles to = copies ? state_ : Particles{};
     with_lanes(lanes_, [&](auto lanes) {
       queue.for_each_group<decltype(lanes)::value>(
-          n_, CollectPass<periodic>{c_, a, candidates(a), sorted, lists(), to});
+          n_, CollectPass<periodic>{c_, a, candidates(a), sorted, lists(a), to});
     });
   }
 
@@ -325,9 +329,8 @@ class GridSearch {
   CellQuery<periodic> cell_query(const Arrays& a) const {
     return {{c_, a.base}, candidates(a), a};
   }
-  Lists lists() const {
-    return {lists_.get(), lanes_, static_cast<unsigned>(n_) * static_cast<unsigned>(lanes_),
-            capacity_, counts_.get()};
+  Lists lists(const Arrays& a) const {
+    return {lists_.get(), lanes_, capacity_, a.ghost, counts_.get()};
   }
   Watch watch() const {
     const bool automatic = o_.rebuild == 0, local = o_.trigger == SolverOptions::Trigger::local;
@@ -346,7 +349,8 @@ class GridSearch {
   void reserve_lists() {
     lists_.resize(0);  // before the larger ones take their room
     if (!keeps_pairs()) return;
-    lists_.resize(static_cast<std::size_t>(capacity_ * lanes_) * static_cast<std::size_t>(n_));
+    capacity_ = (capacity_ + 3) / 4 * 4;
+    lists_.resize(static_cast<std::size_t>(capacity_ / 4 * lanes_) * static_cast<std::size_t>(n_));
     counts_.resize(static_cast<std::size_t>(lanes_) * static_cast<std::size_t>(n_));
   }
 
@@ -366,7 +370,7 @@ class GridSearch {
   }
 
   // Bounds of a skin that is chosen here, and what lists are first made for; shares of H.
-  static constexpr double narrowest = 0.08, usual = 0.2, widest = 0.3;
+  static constexpr double narrowest = 0.08, usual = 0.2, widest = 0.2;
 
   SolverOptions o_;
   bool reuses_;
@@ -381,7 +385,9 @@ class GridSearch {
   mutable SortScratch scratch_;
   Buffer<WallSegment> segments_;
   Buffer<float4> wall_from_, origin_;
-  Buffer<int> bucket_, wall_from_id_, lists_, counts_;
+  Buffer<int> bucket_, wall_from_id_, counts_;
+  Buffer<int2> wall_room_;
+  Buffer<int4> lists_;
   std::vector<std::unique_ptr<Buffer<int>>> near_;
   Buffer<DevicePose> built_;
   Buffer<DisplacementBox> boxes_;

@@ -14,13 +14,15 @@ struct FluidSource {
   Constants c;
   Arrays a;
   Particles from, into;
+  // Of lists that are kept, and the bucket only for the local trigger; null otherwise.
   int* bucket;
-  // Of lists that are kept; null otherwise.
   float4* origin;
   DevicePose* built;
   DeviceGeometry geometry;
   bool tick;  // nobody else counts substeps
 
+  /// What the density pass has not written yet.
+  int2* desk() const { return reinterpret_cast<int2*>(a.point); }
   DECANT_DEVICE Float3 position(int i) const { return xyz(from.position[i]); }
   DECANT_DEVICE int id(int i) const { return a.id[i]; }
   DECANT_DEVICE void begin() const {
@@ -37,7 +39,7 @@ struct FluidSource {
   }
   /// What there is to remember of the build.
   DECANT_DEVICE void note(int to, int in_bucket, float4 x) const {
-    bucket[to] = in_bucket;
+    if (bucket) bucket[to] = in_bucket;
     if (!origin) return;
     const DevicePose* poses = a.poses_now();
     const float skin = sound_skin(a.mailbox->skin);
@@ -53,7 +55,9 @@ struct FrameWallSource {
   const int* from_id;
   float4* local;
   int* to_id;
+  int2* room;  // as many
 
+  int2* desk() const { return room; }
   DECANT_DEVICE Float3 position(int k) const { return xyz(from[k]); }
   DECANT_DEVICE int id(int k) const { return from_id[k]; }
   DECANT_DEVICE void begin() const {}
@@ -70,6 +74,7 @@ struct WorldWallSource {
   FrameWallSource frame;
   int first, container;
 
+  int2* desk() const { return frame.room; }
   DECANT_DEVICE Float3 position(int k) const {
     const DevicePose& pose = a.poses_now()[container];
     return rotate(pose, frame.position(k)) + pose.translation;

@@ -1,9 +1,10 @@
 /// \file
 /// The stages of a substep as one functor each. Those that sum over neighbors are templates on a
 /// query, the only thing in which backends differ:
-///   query.each(team, i, x, points, visit)  visit(j, point_j, d, r2) for every particle j with r < H
-///                                          except i, fluid (j < Arrays::base) and wall; point_j is
-///                                          points[j], d = x − x_j by the nearest image, r2 = |d|²
+///   query.each(team, x, points, visit)     visit(k, j, point_j, d, r2) for every particle j != i with
+///                                          r < H, fluid (j < Arrays::base) and wall, of each particle
+///                                          i = team.particle(k); point_j is points[j], d = x[k] − x_j
+///                                          by the nearest image, r2 = |d|²
 ///   query.weight(j, point_j)               density pass: m, or ρ0 V_j of a wall particle
 ///   query.pressure_term(j, point_j)        force pass: p/ρ² of j; 0 of a wall particle
 /// A visit may come on any lane of the team, and also for pairs farther than H: kernels are 0 there, and
@@ -24,34 +25,56 @@ struct DensityPass {
   const int* wall_id;
 
   template <class Team>
-  DECANT_DEVICE void operator()(Team& team, int i, bool active) const {
-    const float4 own = a.now.position[i];
-    const Float3 x = xyz(own);
-    // The particle itself is counted once.
-    float sum = team.leads() ? c.mass * kernel_w(c, {0.0f, 0.0f}) : 0.0f;
-    int fluid_count = 0, wall_count = 0;
-    long long fluid_ids = 0, wall_ids = 0;
-    query.each(team, i, x, a.now.position, [&](int j, float4 other, Float3, float r2) DECANT_INLINE {
-      sum += query.weight(j, other) * kernel_w(c, radius(r2));
-      if constexpr (facts) {
-        if (!(r2 < c.H2)) return;
-        if (j < a.base) {
-          ++fluid_count;
-          fluid_ids += a.id[j];
-        } else {
-          ++wall_count;
-          wall_ids += wall_id[j - a.base];
-        }
-      }
-    });
-    const float density = team.sum(sum);
-    if constexpr (facts) {
-      fluid_count = team.sum(fluid_count);
-      fluid_ids = team.sum(fluid_ids);
-      wall_count = team.sum(wall_count);
-      wall_ids = team.sum(wall_ids);
+  DECANT_DEVICE void operator()(Team& team) const {
+    Float3 x[Team::held];
+    Sum sum[Team::held];
+#pragma unroll
+    for (int k = 0; k < Team::held; ++k) {
+      x[k] = xyz(a.now.position[team.particle(k)]);
+      sum[k] = {0.0f, 0, 0, 0, 0};
     }
-    if (!active || !team.leads()) return;
+    with_kernel(c, [&](auto kernel) DECANT_INLINE {
+      // The particle itself is counted once.
+      const float own = team.leads() ? c.mass * kernel.w(c, {0.0f, 0.0f}) : 0.0f;
+#pragma unroll
+      for (int k = 0; k < Team::held; ++k) sum[k].density = own;
+      query.each(team, x, a.now.position,
+                 [&](int k, int j, float4 other, Float3, float r2) DECANT_INLINE {
+        sum[k].density += query.weight(j, other) * kernel.w(c, radius(r2));
+        if constexpr (facts) {
+          if (!(r2 < c.H2)) return;
+          if (j < a.base) {
+            ++sum[k].fluid_count;
+            sum[k].fluid_ids += a.id[j];
+          } else {
+            ++sum[k].wall_count;
+            sum[k].wall_ids += wall_id[j - a.base];
+          }
+        }
+      });
+    });
+#pragma unroll
+    for (int k = 0; k < Team::held; ++k) tell(team, k, x[k], sum[k]);
+  }
+
+ private:
+  struct Sum {
+    float density;
+    int fluid_count, wall_count;
+    long long fluid_ids, wall_ids;
+  };
+
+  template <class Team>
+  DECANT_DEVICE void tell(Team& team, int k, Float3 x, Sum sum) const {
+    const float density = team.sum(sum.density);
+    if constexpr (facts) {
+      sum.fluid_count = team.sum(sum.fluid_count);
+      sum.fluid_ids = team.sum(sum.fluid_ids);
+      sum.wall_count = team.sum(sum.wall_count);
+      sum.wall_ids = team.sum(sum.wall_ids);
+    }
+    if (!team.active(k) || !team.leads()) return;
+    const int i = team.particle(k);
     const float p = pressure_at(c, density);
     const float4 v = a.now.velocity[i];
     a.point[i] = make_float4(x.x, x.y, x.z, p / (density * density));
@@ -60,10 +83,10 @@ struct DensityPass {
       const int id = a.id[i];
       out.density[id] = density;
       out.pressure[id] = p;
-      out.fluid_count[id] = fluid_count;
-      out.fluid_id_sum[id] = fluid_ids;
-      out.wall_count[id] = wall_count;
-      out.wall_id_sum[id] = wall_ids;
+      out.fluid_count[id] = sum.fluid_count;
+      out.fluid_id_sum[id] = sum.fluid_ids;
+      out.wall_count[id] = sum.wall_count;
+      out.wall_id_sum[id] = sum.wall_ids;
     }
   }
 };
@@ -91,54 +114,79 @@ struct ForcePass {
   FieldArrays out;
 
   template <class Team>
-  DECANT_DEVICE void operator()(Team& team, int i, bool active) const {
-    const float4 point = a.point[i], motion = a.motion[i];
-    const Float3 x = xyz(point), v = xyz(motion);
-    const float q = point.w, inverse_density = motion.w;
-    const float fluid_viscosity = c.viscosity * c.mass;
-    Float3 pressure{0, 0, 0}, viscous{0, 0, 0}, wall_pressure{0, 0, 0}, wall_viscous{0, 0, 0};
-    query.each(team, i, x, a.point, [&](int j, float4 other, Float3 d, float r2) DECANT_INLINE {
-      const Radius r = radius(r2);
-      const float g = kernel_g(c, r);
-      const float4 moves = read_only(a.motion + j);
-      const bool wall = j >= a.base;
-      const float weight = wall ? c.rest_density * moves.w : c.mass;
-      const float drag = moves.w * (wall ? c.wall_viscosity : fluid_viscosity);
-      const Float3 push = (weight * (q + query.pressure_term(j, other)) * g) * d;
-      const Float3 pull = (drag * kernel_l(c, r, r2, g)) * (xyz(moves) - v);
-      if constexpr (facts) {
-        if (wall) {
-          wall_pressure = wall_pressure + push;
-          wall_viscous = wall_viscous + pull;
-          return;
-        }
-      }
-      pressure = pressure + push;
-      viscous = viscous + pull;
-    });
-    viscous = inverse_density * viscous;
-    if constexpr (facts) {
-      pressure = total(team, pressure);
-      viscous = total(team, viscous);
-      wall_pressure = total(team, wall_pressure);
-      wall_viscous = total(team, inverse_density * wall_viscous);
-      if (!active || !team.leads()) return;
-      const Float3 sum = (pressure + wall_pressure) + (viscous + wall_viscous) + c.gravity;
-      const int id = a.id[i];
-      // A position that is no number is nobody's neighbor, and falls as if it were alone.
-      if (!is_finite(sum) || !is_finite(x)) report(&a.mailbox->non_finite, 0, id);
-      tell(out.pressure_acceleration, id, pressure);
-      tell(out.viscous_acceleration, id, viscous);
-      tell(out.wall_pressure_acceleration, id, wall_pressure);
-      tell(out.wall_viscous_acceleration, id, wall_viscous);
-      tell(out.acceleration, id, sum);
-    } else {
-      const Float3 sum = total(team, pressure + viscous) + c.gravity;
-      if (active && team.leads()) a.acceleration[i] = make_float4(sum.x, sum.y, sum.z, 0.0f);
+  DECANT_DEVICE void operator()(Team& team) const {
+    Float3 x[Team::held];
+    Own own[Team::held];
+    Sum sum[Team::held];
+#pragma unroll
+    for (int k = 0; k < Team::held; ++k) {
+      const float4 point = a.point[team.particle(k)], motion = a.motion[team.particle(k)];
+      x[k] = xyz(point);
+      own[k] = {xyz(motion), point.w, motion.w};
+      sum[k] = {};
     }
+    const float fluid_viscosity = c.viscosity * c.mass;
+    with_kernel(c, [&](auto kernel) DECANT_INLINE {
+      query.each(team, x, a.point,
+                 [&](int k, int j, float4 other, Float3 d, float r2) DECANT_INLINE {
+        const Radius r = radius(r2);
+        const float g = kernel.g(c, r);
+        const float4 moves = read_only(a.motion + j);
+        const bool wall = j >= a.base;
+        const float weight = wall ? c.rest_density * moves.w : c.mass;
+        const float drag = moves.w * (wall ? c.wall_viscosity : fluid_viscosity);
+        const Float3 push = (weight * (own[k].q + query.pressure_term(j, other)) * g) * d;
+        const Float3 pull = (drag * kernel.l(c, r, r2, g)) * (xyz(moves) - own[k].v);
+        if constexpr (facts) {
+          if (wall) {
+            sum[k].wall_pressure = sum[k].wall_pressure + push;
+            sum[k].wall_viscous = sum[k].wall_viscous + pull;
+            return;
+          }
+        }
+        sum[k].pressure = sum[k].pressure + push;
+        sum[k].viscous = sum[k].viscous + pull;
+      });
+    });
+#pragma unroll
+    for (int k = 0; k < Team::held; ++k) finish(team, k, x[k], own[k].inverse_density, sum[k]);
   }
 
  private:
+  struct Own {
+    Float3 v;
+    float q, inverse_density;  // q = p/ρ²
+  };
+  struct Sum {
+    Float3 pressure, viscous, wall_pressure, wall_viscous;
+  };
+
+  template <class Team>
+  DECANT_DEVICE void finish(Team& team, int k, Float3 x, float inverse_density, Sum s) const {
+    const int i = team.particle(k);
+    const bool writes = team.active(k) && team.leads();
+    s.viscous = inverse_density * s.viscous;
+    if constexpr (facts) {
+      s.pressure = total(team, s.pressure);
+      s.viscous = total(team, s.viscous);
+      s.wall_pressure = total(team, s.wall_pressure);
+      s.wall_viscous = total(team, inverse_density * s.wall_viscous);
+      if (!writes) return;
+      const Float3 sum =
+          (s.pressure + s.wall_pressure) + (s.viscous + s.wall_viscous) + c.gravity;
+      const int id = a.id[i];
+      // A position that is no number is nobody's neighbor, and falls as if it were alone.
+      if (!is_finite(sum) || !is_finite(x)) report(&a.mailbox->non_finite, 0, id);
+      tell(out.pressure_acceleration, id, s.pressure);
+      tell(out.viscous_acceleration, id, s.viscous);
+      tell(out.wall_pressure_acceleration, id, s.wall_pressure);
+      tell(out.wall_viscous_acceleration, id, s.wall_viscous);
+      tell(out.acceleration, id, sum);
+    } else {
+      const Float3 sum = total(team, s.pressure + s.viscous) + c.gravity;
+      if (writes) a.acceleration[i] = make_float4(sum.x, sum.y, sum.z, 0.0f);
+    }
+  }
   DECANT_DEVICE static void tell(float* to, int id, Float3 v) {
     const auto k = 3 * static_cast<std::size_t>(id);
     to[k] = v.x;

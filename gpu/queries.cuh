@@ -1,6 +1,5 @@
 /// \file
-/// Two queries: CellQuery tests every particle of the cells around, ListQuery reads lists. CollectPass
-/// writes lists, to H and a skin, from cells.
+/// Two queries: CellQuery tests every particle of the cells around, ListQuery reads lists.
 #pragma once
 
 #include "gpu/passes.cuh"
@@ -57,9 +56,7 @@ struct Candidates {
         Float3 at = x;
         if (wall && poses_now) {
           if (!s->in_world) at = rotate_back(poses_now[k], x - poses_now[k].translation);
-          if (at.x < s->low.x || at.x > s->high.x || at.y < s->low.y || at.y > s->high.y ||
-              at.z < s->low.z || at.z > s->high.z)
-            continue;
+          if (s->out_of_reach(at)) continue;
         }
         bucket = t->bucket_of(at);
         if (wall && s->near) {
@@ -102,121 +99,57 @@ struct CellQuery : FullPoints {
   Arrays a;
 
   template <class Team, class Visit>
-  DECANT_DEVICE void each(Team& team, int i, Float3 x, const float4* points, Visit&& visit) const {
-    candidates.around<periodic>(team.lane(), Team::lanes, x, a.poses_now(),
+  DECANT_DEVICE void each(Team& team, const Float3 (&x)[1], const float4* points,
+                          Visit&& visit) const {
+    const int i = team.particle(0);
+    candidates.around<periodic>(team.lane(), Team::lanes, x[0], a.poses_now(),
                                 [&](Candidates::Run run) DECANT_INLINE {
-      test<Team::lanes>(i, x, points, run, visit);
+      test<Team::lanes>(x[0], points, run,
+                        [&](int j, float4 other, Float3 d, float r2) DECANT_INLINE {
+        if (j != i) visit(0, j, other, d, r2);
+      });
     });
   }
   template <class Team, class Visit>
-  DECANT_DEVICE void of_segment(Team& team, int k, Float3 x, const float4* points,
+  DECANT_DEVICE void of_segment(Team& team, int k, const Float3 (&x)[1], const float4* points,
                                 Visit&& visit) const {
-    candidates.of_segment<periodic>(team.lane(), Team::lanes, k, x, [&](Candidates::Run run) DECANT_INLINE {
-      test<Team::lanes>(-1, x, points, run, visit);
+    candidates.of_segment<periodic>(team.lane(), Team::lanes, k, x[0],
+                                    [&](Candidates::Run run) DECANT_INLINE {
+      test<Team::lanes>(x[0], points, run,
+                        [&](int, float4, Float3, float r2) DECANT_INLINE { visit(0, r2); });
     });
   }
 
  private:
-  template <int lanes, class Visit>
-  DECANT_DEVICE void test(int i, Float3 x, const float4* points, Candidates::Run run,
-                          Visit&& visit) const {
+  template <int lanes, class Near>
+  DECANT_DEVICE void test(Float3 x, const float4* points, Candidates::Run run, Near&& near) const {
     for (int k = run.begin; k < run.end; k += run.listed ? lanes : 1) {
       const int j = run.listed ? read_only(run.listed + k) : k;
       const float4 other = read_only(points + j);
       const Float3 d = nearest_image<periodic>(c, x - xyz(other));
       const float r2 = dot(d, d);
-      if (r2 < c.H2 && j != i) visit(j, other, d, r2);
+      if (r2 < c.H2) near(j, other, d, r2);
     }
   }
 };
 
-/// Neighbor lists of all particles, one for each lane that will work on the particle: entry e of lane l
-/// of particle i at entry[e × lanes × n + i × lanes + l], so that the threads of a warp write and read
-/// consecutive words.
+/// Neighbor lists, fluid and wall alike: near a wall its particles take the place of the missing fluid,
+/// so one short capacity serves both. Each lane that works on a particle has a list of its own. Four
+/// entries are one word; the lanes' words lie side by side, so that a sector of memory is read whole.
+/// The last word is filled up with `ghost`, a point far from everything.
 struct Lists {
-  int* entry;
+  int4* word;    // word w of lane l of particle i at word[(i × capacity/4 + w) × lanes + l]
   int lanes;
-  unsigned step;  // lanes × n
-  int capacity;   // entries a lane
-  int* count;     // [n × lanes]; more than capacity: the list is cut, and useless
+  int capacity;  // entries a lane, a multiple of 4
+  int ghost;
+  int* count;    // [n × lanes]; more than capacity: the list is cut, and useless
 
-  DECANT_DEVICE std::size_t first(int i, int lane) const {
-    return static_cast<std::size_t>(i) * static_cast<std::size_t>(lanes) +
-           static_cast<std::size_t>(lane);
+  DECANT_DEVICE int4* words(int i, int lane) const {
+    return word + static_cast<std::size_t>(i) * static_cast<std::size_t>(capacity / 4 * lanes) + lane;
   }
-};
-
-/// Writes the lists, fluid and wall neighbors alike: near a wall its particles take the place of the
-/// missing fluid, so one short capacity serves both. Evaluates nothing: hits are rare among candidates,
-/// and a kernel evaluated for one lane in ten costs as much as for all. Lanes need not agree on
-/// anything. A particle finds itself too; who reads the list skips it.
-template <bool periodic>
-struct CollectPass {
-  Constants c;
-  Arrays a;
-  Candidates candidates;
-  Particles sorted;  // the fluid; wall particles are in a.now
-  Lists lists;
-  Particles copies;  // where the fluid goes as well; null: nowhere
-
-  template <class Team>
-  DECANT_DEVICE void operator()(Team& team, int i, bool) const {
-    const float4 own = sorted.position[i];
-    const float reach = c.H + a.mailbox->skin;
-    Shelf shelf{xyz(own), reach * reach, lists.entry + lists.first(i, team.lane()), 0};
-    candidates.around<periodic>(team.lane(), Team::lanes, shelf.x, a.poses_now(),
-                                [&](Candidates::Run run) DECANT_INLINE {
-      if (run.listed)
-        search<Team::lanes>(shelf, run.begin, run.end,
-                            [&](int k) DECANT_INLINE { return read_only(run.listed + k); }, a.now.position);
-      else
-        search<1>(shelf, run.begin, run.end, [](int k) DECANT_INLINE { return k; },
-                            run.begin < a.base ? sorted.position : a.now.position);
-    });
-    lists.count[lists.first(i, team.lane())] = shelf.count;
-    if (shelf.count > lists.capacity) atomic_maximum(&a.mailbox->longest_list, shelf.count);
-    if (!copies.position || !team.leads()) return;
-    copies.position[i] = own;
-    copies.velocity[i] = sorted.velocity[i];
-  }
-
- private:
-  /// A lane's list on its way; counts on where there is no more room.
-  struct Shelf {
-    Float3 x;
-    float reach2;
-    int* entry;
-    int count;
-  };
-
-  /// Candidates k, k + step, … before `end`. Written for few instructions a candidate: this is where a
-  /// hash spends its time.
-  template <int step, class Index>
-  DECANT_DEVICE void search(Shelf& shelf, int k, int end, Index index, const float4* points) const {
-    constexpr int batch = 4;
-#pragma unroll 1
-    for (; k + (batch - 1) * step < end; k += batch * step) {
-      int j[batch];
-      float4 other[batch];
-#pragma unroll
-      for (int b = 0; b < batch; ++b) j[b] = index(k + b * step);
-#pragma unroll
-      for (int b = 0; b < batch; ++b) other[b] = read_only(points + j[b]);
-#pragma unroll
-      for (int b = 0; b < batch; ++b) test(shelf, j[b], other[b]);
-    }
-#pragma unroll 1
-    for (; k < end; k += step) {
-      const int j = index(k);
-      test(shelf, j, read_only(points + j));
-    }
-  }
-  DECANT_DEVICE void test(Shelf& shelf, int j, float4 other) const {
-    const Float3 d = nearest_image<periodic>(c, shelf.x - xyz(other));
-    if (!(dot(d, d) < shelf.reach2)) return;
-    if (shelf.count < lists.capacity)
-      shelf.entry[static_cast<std::uint64_t>(static_cast<unsigned>(shelf.count)) * lists.step] = j;
-    ++shelf.count;
+  DECANT_DEVICE int& count_of(int i, int lane) const {
+    return count[static_cast<std::size_t>(i) * static_cast<std::size_t>(lanes) +
+                 static_cast<std::size_t>(lane)];
   }
 };
 
@@ -225,27 +158,28 @@ struct ListQuery : FullPoints {
   Lists lists;
 
   template <class Team, class Visit>
-  DECANT_DEVICE void each(Team& team, int i, Float3 x, const float4* points, Visit&& visit) const {
-    constexpr int batch = 4;  // fetched together, then used
-    const std::size_t first = lists.first(i, team.lane());
-    const int listed = lists.count[first];
-    const int count = listed < lists.capacity ? listed : lists.capacity;
-    const int* from = lists.entry + first;
-    for (int e = 0; e < count; e += batch) {
-      int j[batch];
-      float4 other[batch];
+  DECANT_DEVICE void each(Team& team, const Float3 (&x)[1], const float4* points,
+                          Visit&& visit) const {
+    const int i = team.particle(0), listed = lists.count_of(i, team.lane());
+    const int words = ((listed < lists.capacity ? listed : lists.capacity) + 3) / 4;
+    const int4* from = lists.words(i, team.lane());
+    int4 next = make_int4(lists.ghost, lists.ghost, lists.ghost, lists.ghost);
+    if (words > 0) next = read_only(from);
+#pragma unroll 1
+    for (int w = 1; w <= words; ++w) {
+      const int j[4] = {next.x, next.y, next.z, next.w};
+      // The next word is on its way while this one is worked on.
+      from += Team::lanes;
+      if (w < words) next = read_only(from);
+      float4 other[4];
 #pragma unroll
-      for (int k = 0; k < batch; ++k) {
-        j[k] = e + k < count ? read_only(from) : i;
-        from += lists.step;
-      }
+      for (int k = 0; k < 4; ++k) other[k] = read_only(points + j[k]);
 #pragma unroll
-      for (int k = 0; k < batch; ++k) other[k] = read_only(points + j[k]);
-#pragma unroll
-      for (int k = 0; k < batch; ++k) {
-        const Float3 d = nearest_image<periodic>(c, x - xyz(other[k]));
-        // The particle itself, in the list and past its end, adds nothing from far away.
-        visit(j[k], other[k], d, j[k] != i ? dot(d, d) : 4.0f * c.H2);
+      for (int k = 0; k < 4; ++k) {
+        const Float3 d = nearest_image<periodic>(c, x[0] - xyz(other[k]));
+        // In a periodic scene nothing is far from everything.
+        const bool there = !periodic || j[k] != lists.ghost;
+        visit(0, j[k], other[k], d, there ? dot(d, d) : 4.0f * c.H2);
       }
     }
   }

@@ -60,15 +60,15 @@ class Queue {
     particle_kernel<<<(n + 255) / 256, 256, 0, stream_>>>(n, body);
     CUDA_CHECK(cudaGetLastError());
   }
-  /// body(team, i, active) with a TileTeam.
+  /// body(team) with a TileTeam, for particles 0 … n−1.
   template <class Body>
   void for_each_tile_team(int n, Body body) {
     if (n <= 0) return;
-    constexpr int particles = TileTeam<tile_lanes>::particles;
-    tile_kernel<tile_lanes><<<(n + particles - 1) / particles, tile_size, 0, stream_>>>(n, body);
+    constexpr int particles = TileTeam::particles;
+    tile_kernel<<<(n + particles - 1) / particles, tile_size, 0, stream_>>>(n, body);
     CUDA_CHECK(cudaGetLastError());
   }
-  /// body(group, i, true) with a Group.
+  /// body(group) with a Group, for particles 0 … n−1.
   template <int lanes, class Body>
   void for_each_group(int n, Body body) {
     if (n <= 0) return;
@@ -244,15 +244,15 @@ class Queue {
   template <class Body>
   void for_each_tile_team(int n, Body body) {
     for_each(n, [body](int i) {
-      TileTeam<1> team;
-      body(team, i, true);
+      TileTeam team(i);
+      body(team);
     });
   }
   template <int lanes, class Body>
   void for_each_group(int n, Body body) {
     for_each(n, [body](int i) {
-      Group<1> group;
-      body(group, i, true);
+      Group<1> group(i);
+      body(group);
     });
   }
   void fill_zero(void* p, std::size_t bytes) {

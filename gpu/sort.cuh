@@ -4,7 +4,7 @@
 /// that of the ids (counting) or the one before (Thrust, stable): the same every time.
 ///
 /// A Source tells position(i) and id(i) of thing i, and place(i, id, to, bucket) puts it; begin() is
-/// called once, by whoever comes first.
+/// called once, by whoever comes first; desk() is memory for the sort, of no use to others meanwhile.
 #pragma once
 
 #include "gpu/cells.cuh"
@@ -15,7 +15,6 @@ namespace decant::gpu::DECANT_EXECUTOR {
 /// Device memory that a sort needs; several sorts one after the other may share one.
 struct SortScratch {
   Buffer<int> key, slot;
-  Buffer<int2> at;
   Buffer<char> scan;
 
   void reserve(int things, int buckets) {
@@ -23,11 +22,10 @@ struct SortScratch {
     if (key.size() < n) {
       key.resize(n);
       slot.resize(n);
-      at.resize(n);
     }
     Queue::reserve_scan(buckets + 1, scan);
   }
-  std::size_t bytes() const { return key.bytes() + slot.bytes() + at.bytes() + scan.bytes(); }
+  std::size_t bytes() const { return key.bytes() + slot.bytes() + scan.bytes(); }
 };
 
 template <class Source>
@@ -50,10 +48,12 @@ template <class Source>
 struct ScatterPass {
   Source source;
   const int *key, *slot, *start;
+  int* count;
   int2* at;
 
   DECANT_DEVICE void operator()(int i) const {
     if (i == 0) source.begin();
+    if (slot[i] == 0) count[key[i]] = 0;  // for the next sort
     at[start[key[i]] + slot[i]] = make_int2(source.id(i), i);
   }
 };
@@ -104,25 +104,25 @@ struct PlaceSortedPass {
 /// The table of cells of n things, and the things in its order.
 class CellSort {
  public:
-  void prepare(const CellTable& table, int n, SortScratch& scratch) {
+  void prepare(Queue& queue, const CellTable& table, int n, SortScratch& scratch) {
     table_ = table;
     start_.resize(static_cast<std::size_t>(table.buckets) + 1);
     count_.resize(static_cast<std::size_t>(table.buckets) + 1);
     table_.start = start_.get();
     scratch.reserve(n, table.buckets);
+    clear(queue);
   }
   const CellTable& table() const { return table_; }
   std::size_t bytes() const { return start_.bytes() + count_.bytes(); }
 
   template <class Source>
   void counting(Queue& queue, int n, const Source& source, SortScratch& s) {
-    clear(queue);
     queue.for_each(n, counter(source, s));
     place_counted(queue, n, source, s);
   }
 
-  /// The same in parts, for whoever counts on the way: clear, counter(…).count_in(i, x) for all, and
-  /// place_counted, which leaves all cleared again.
+  /// The same in parts, for whoever counts on the way: counter(…).count_in(i, x) for all, and
+  /// place_counted, which leaves nothing counted; `clear` forgets what was.
   void clear(Queue& queue) { queue.fill_zero(count_.get(), count_.bytes()); }
   template <class Source>
   KeyPass<Source> counter(const Source& source, SortScratch& s) const {
@@ -131,15 +131,14 @@ class CellSort {
   template <class Source>
   void place_counted(Queue& queue, int n, const Source& source, SortScratch& s) {
     queue.exclusive_scan(count_.get(), start_.get(), table_.buckets + 1, s.scan);
-    clear(queue);
     queue.for_each(n, ScatterPass<Source>{source, s.key.get(), s.slot.get(), start_.get(),
-                                          s.at.get()});
-    queue.for_each(n, PlacePass<Source>{source, s.key.get(), start_.get(), s.at.get()});
+                                          count_.get(), source.desk()});
+    queue.for_each(n, PlacePass<Source>{source, s.key.get(), start_.get(), source.desk()});
   }
 
   template <class Source>
   void thrust(Queue& queue, int n, const Source& source, const int* id, SortScratch& s) {
-    int* kept = reinterpret_cast<int*>(s.at.get());
+    int* kept = reinterpret_cast<int*>(source.desk());
     queue.for_each(n, PlainKeyPass<Source>{table_, source, s.key.get(), s.slot.get()});
     queue.for_each(n, KeepIdPass{id, kept});
     queue.sort_by_key(s.key.get(), s.slot.get(), n);

@@ -1,8 +1,10 @@
 /// \file
-/// Several lanes for one particle, in two forms. A TileTeam spans a block and reads all points tile by
+/// Several threads for one thing, in two forms. A TileTeam spans a block and reads all points tile by
 /// tile through shared memory: for all pairs. A Group is 1, 2, 4 or 8 neighboring threads of a warp:
-/// for cells and lists, where a few lanes a particle fill a chip that 50,000 threads do not.
-/// Both offer lane(), leads() and sum(); a body gets (team, i, active) and writes nothing unless active.
+/// for lists and cells, where a few lanes a particle fill a chip that 50,000 threads do not.
+///
+/// Both hold particles: particle(k) for k < held, active(k) where it is one of its own, and
+/// offer lane(), leads() and sum(). Nothing is written for a particle that is not active.
 #pragma once
 
 #include "gpu/exec.cuh"
@@ -10,36 +12,42 @@
 namespace decant::gpu::DECANT_EXECUTOR {
 
 #ifdef __CUDACC__
-/// Lanes of a TileTeam on this executor.
-inline constexpr int tile_lanes = 4;
+/// Lanes of a TileTeam on this executor, and particles of one of its threads. A point read from shared
+/// memory takes four cycles, the test of a pair one, so each point is tested with four particles.
+inline constexpr int tile_lanes = 16, tile_held = 4;
+/// Points of a tile: the longer it is, the fewer the waits for all threads to have read it.
+inline constexpr int tile_points = 8 * tile_size;
 /// Threads of a block of groups.
 inline constexpr int group_block = 128;
 #else
-inline constexpr int tile_lanes = 1;
+inline constexpr int tile_lanes = 1, tile_held = 1, tile_points = tile_size;
 #endif
 
-/// A lane is a whole warp wide: the threads of a warp serve neighboring particles and read the same
-/// point of a tile at once. Every thread of a block runs the same calls, so a sweep or a sum may
-/// synchronise inside.
-template <int lanes>
+/// Every thread of a block runs the same calls, so a sweep or a sum may synchronise inside. Lanes
+/// past the end shadow the last particle.
 class TileTeam {
  public:
+  static constexpr int held = tile_held;
 #ifdef __CUDACC__
-  static constexpr int particles = tile_size / lanes;  // a block
-  static_assert(particles % 32 == 0, "a warp must not be split between lanes");
-  __device__ TileTeam(float4* tile) : tile_(tile) {}
-  DECANT_DEVICE int lane() const { return static_cast<int>(threadIdx.x) / particles; }
+  static constexpr int side = tile_size / tile_lanes;  // threads a lane
+  static constexpr int particles = side * held;        // a block
+  __device__ TileTeam(float4* tile, int n) : tile_(tile), n_(n) {}
+  DECANT_DEVICE int lane() const { return static_cast<int>(threadIdx.x) / side; }
   DECANT_DEVICE bool leads() const { return lane() == 0; }
+  DECANT_DEVICE int particle(int k) const { return active(k) ? place(k) : n_ - 1; }
+  DECANT_DEVICE bool active(int k) const { return place(k) < n_; }
 
-  /// visit(first, tile) for one tile of points [begin, end) after the other, whole tiles.
-  template <class Visit>
-  DECANT_DEVICE void tiles(const float4* points, int begin, int end, Visit&& visit) {
-    for (int first = begin; first < end; first += tile_size) {
-      __syncthreads();
-      tile_[threadIdx.x] = points[first + static_cast<int>(threadIdx.x)];
-      __syncthreads();
-      visit(first, tile_);
+  /// As many points from `first` on as a tile has, for all threads to read until the next call; beyond
+  /// `end`, a multiple of tile_size away, NaN.
+  DECANT_DEVICE const float4* tile(const float4* points, int first, int end) const {
+    __syncthreads();
+#pragma unroll
+    for (int k = 0; k < tile_points; k += tile_size) {
+      const int at = k + static_cast<int>(threadIdx.x);
+      tile_[at] = first + k < end ? points[first + at] : make_float4(NAN, NAN, NAN, NAN);
     }
+    __syncthreads();
+    return tile_;
   }
   /// Sum over the team's lanes, in a fixed order, on every lane.
   template <class T>
@@ -49,25 +57,32 @@ class TileTeam {
     __syncthreads();
     part[threadIdx.x] = value;
     __syncthreads();
-    T total = part[threadIdx.x % particles];
-    for (int l = 1; l < lanes; ++l) total += part[l * particles + threadIdx.x % particles];
+    T total = part[threadIdx.x % side];
+    for (int l = 1; l < tile_lanes; ++l) total += part[l * side + threadIdx.x % side];
     return total;
   }
 
  private:
+  DECANT_DEVICE int place(int k) const {
+    return static_cast<int>(blockIdx.x) * particles + k * side +
+           static_cast<int>(threadIdx.x) % side;
+  }
   float4* tile_;
+  int n_;
 #else
-  static_assert(lanes == 1, "the host runs one lane a particle");
+  explicit TileTeam(int i) : i_(i) {}
   int lane() const { return 0; }
   bool leads() const { return true; }
-  template <class Visit>
-  void tiles(const float4* points, int begin, int end, Visit&& visit) {
-    for (int first = begin; first < end; first += tile_size) visit(first, points + first);
-  }
+  int particle(int) const { return i_; }
+  bool active(int) const { return true; }
+  const float4* tile(const float4* points, int first, int) const { return points + first; }
   template <class T>
   T sum(T value) const {
     return value;
   }
+
+ private:
+  int i_;
 #endif
 };
 
@@ -75,7 +90,10 @@ class TileTeam {
 template <int lanes_>
 class Group {
  public:
-  static constexpr int lanes = lanes_;
+  static constexpr int lanes = lanes_, held = 1;
+  DECANT_DEVICE explicit Group(int i) : i_(i) {}
+  DECANT_DEVICE int particle(int) const { return i_; }
+  DECANT_DEVICE bool active(int) const { return true; }
 #ifdef __CUDACC__
   static_assert(lanes == 1 || lanes == 2 || lanes == 4 || lanes == 8);
   DECANT_DEVICE int lane() const { return static_cast<int>(threadIdx.x) % lanes; }
@@ -97,6 +115,9 @@ class Group {
     return value;
   }
 #endif
+
+ private:
+  int i_;
 };
 
 #ifdef __CUDACC__
@@ -107,22 +128,18 @@ __global__ void __launch_bounds__(256) particle_kernel(int n, Body body) {
   if (i < n) body(i);
 }
 
-template <int lanes, class Body>
+template <class Body>
 __global__ void __launch_bounds__(tile_size) tile_kernel(int n, Body body) {
-  __shared__ float4 tile[tile_size];
-  TileTeam<lanes> team(tile);
-  const int i = static_cast<int>(blockIdx.x) * TileTeam<lanes>::particles +
-                static_cast<int>(threadIdx.x) % TileTeam<lanes>::particles;
-  // Lanes past the end shadow the last particle: they must meet every barrier.
-  body(team, i < n ? i : n - 1, i < n);
+  __shared__ float4 tile[tile_points];
+  TileTeam team(tile, n);
+  body(team);
 }
 
 template <int lanes, class Body>
 __global__ void __launch_bounds__(group_block) group_kernel(int n, Body body) {
   const auto thread = static_cast<long long>(blockIdx.x) * group_block + threadIdx.x;
-  const int i = static_cast<int>(thread / lanes);
-  Group<lanes> group;
-  if (i < n) body(group, i, true);
+  Group<lanes> group(static_cast<int>(thread / lanes));
+  if (group.particle(0) < n) body(group);
 }
 
 #endif

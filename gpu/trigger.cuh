@@ -62,7 +62,7 @@ struct SkinPass {
   float least, most;  // m
 
   DECANT_DEVICE void operator()(int) const {
-    constexpr float build_to_growth = 1.0f;  // b/g as measured
+    constexpr float build_to_growth = 0.6f;  // b/g as measured
     const float way = 2.0f * radius(unordered(mailbox->fastest)).r * c.dt;
     const float s = radius(build_to_growth * way * c.H).r;
     mailbox->skin = s < least ? least : s <= most ? s : most;

@@ -19,6 +19,11 @@ struct WallSegment {
   // near[near_start[bucket]] on. Null: to be looked up row by row.
   const int *near_start, *near;
   bool in_world;  // looked up in the world, not in the container's frame
+
+  DECANT_DEVICE bool out_of_reach(Float3 x) const {
+    return x.x < low.x || x.x > high.x || x.y < low.y || x.y > high.y || x.z < low.z ||
+           x.z > high.z;
+  }
 };
 
 /// Slots of all containers, each padded to whole tiles; an id of −1 is padding.
@@ -72,13 +77,25 @@ struct VolumePass {
   int container, begin;  // its first slot
 
   template <class Team>
-  DECANT_DEVICE void operator()(Team& team, int k, bool active) const {
-    const int slot = begin + k;
-    float sum = 0.0f;
-    query.of_segment(team, container, xyz(a.now.position[a.base + slot]), a.now.position,
-                     [&](int, float4, Float3, float r2) DECANT_INLINE { sum += kernel_w(c, radius(r2)); });
-    sum = team.sum(sum);
-    if (active && team.leads()) walls.volume[walls.id[slot]] = 1.0f / sum;
+  DECANT_DEVICE void operator()(Team& team) const {
+    Float3 x[Team::held];
+    float sum[Team::held];
+#pragma unroll
+    for (int k = 0; k < Team::held; ++k) {
+      x[k] = xyz(a.now.position[a.base + begin + team.particle(k)]);
+      sum[k] = 0.0f;
+    }
+    with_kernel(c, [&](auto kernel) DECANT_INLINE {
+      query.of_segment(team, container, x, a.now.position, [&](int k, float r2) DECANT_INLINE {
+        sum[k] += kernel.w(c, radius(r2));
+      });
+    });
+#pragma unroll
+    for (int k = 0; k < Team::held; ++k) {
+      const float total = team.sum(sum[k]);
+      if (team.active(k) && team.leads())
+        walls.volume[walls.id[begin + team.particle(k)]] = 1.0f / total;
+    }
   }
 };
 
