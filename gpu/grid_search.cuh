@@ -31,7 +31,7 @@ class GridSearch {
     widest_skin_ = !reuses_ ? 0.0f : static_cast<float>(o_.skin < 0 ? widest : o_.skin) * c.H;
     reach_ = c.H + widest_skin_;
 #ifdef __CUDACC__
-    lanes_ = o_.lanes ? o_.lanes : reuses_ || !large() ? 2 : 1;
+    lanes_ = o_.lanes ? o_.lanes : fitting_lanes();
 #endif
     sort_fluid_ = !(reuses_ && o_.build == SolverOptions::Build::all_pairs);
     prepare_fluid(queue, positions, a.containers);
@@ -133,6 +133,11 @@ class GridSearch {
   }
 
  private:
+  /// Few particles do not fill the chip: more lanes for each.
+  int fitting_lanes() const {
+    if (n_ < 25000) return n_ < 8000 && !reuses_ ? 8 : 4;
+    return reuses_ || !large() ? 2 : 1;
+  }
   /// From here on a particle's bytes count more than how long a warp waits, and few are near walls.
   bool large() const { return n_ >= 300000; }
   bool keeps_pairs() const { return reuses_ || o_.pairs == SolverOptions::Pairs::keep; }
