@@ -1,9 +1,12 @@
 /// \file
-/// Comparison of a backend's fields with the oracle's. Every comparison is written so that NaN fails.
+/// What the oracle prepares, and the checks of fields and of one substep.
 #include "oracle/conform.hpp"
 
+#include "oracle/comparison.hpp"
+#include "oracle/run_checks.hpp"
 #include "reference/error.hpp"
 #include "reference/sampling.hpp"
+#include "reference/solver.hpp"
 
 #include <fmt/format.h>
 
@@ -13,130 +16,10 @@
 #include <limits>
 #include <optional>
 
-#if __FINITE_MATH_ONLY__
-#error "compiled with -ffinite-math-only a comparator cannot see NaN"
-#endif
-
 namespace decant {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-
-/// Error over tolerance; a tolerance of 0 asks for equality.
-double score_of(double error, double tolerance) {
-  if (!(tolerance >= 0 && tolerance < infinity)) return infinity;
-  if (error == 0) return 0;
-  const double score = error / tolerance;
-  return score >= 0 ? score : infinity;  // NaN, whatever made it
-}
-
-/// Values of one field, particle by particle, `components` a particle.
-struct Values {
-  Eigen::VectorXd got, expected, tolerance;
-  Eigen::VectorXd float_value;  // empty: no fp32 counterpart
-  int components = 1;
-  const std::vector<bool>* excluded = nullptr;
-  std::int64_t most_excluded = 0;
-  // What an excluded value must keep all the same: sane, if not precise.
-  double excluded_least = -infinity, excluded_tolerance = infinity;
-};
-
-template <class Matrix>
-Eigen::VectorXd flat(const Matrix& m) {
-  return Eigen::Map<const Eigen::Matrix<typename Matrix::Scalar, Eigen::Dynamic, 1>>(m.data(),
-                                                                                     m.size())
-      .template cast<double>();
-}
-
-void compare(const Values& v, CheckRow& row) {
-  const auto n = v.expected.size();
-  if (v.got.size() != n) {
-    row.verdict = Verdict::fail;
-    row.score = infinity;
-    row.reason = "has " + std::to_string(v.got.size()) + " values, not " + std::to_string(n);
-    return;
-  }
-  row.error = (v.got - v.expected).cwiseAbs();
-  row.tolerances = v.tolerance;
-  std::vector<double> scores;
-  double worst = -1, float_worst = v.float_value.size() ? 0 : std::nan("");
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const auto particle = static_cast<std::size_t>(k / v.components);
-    if (v.excluded && (*v.excluded)[particle]) {
-      if (k % v.components == 0) ++row.excluded;
-      if (std::isfinite(v.got[k]) && v.got[k] >= v.excluded_least &&
-          row.error[k] <= v.excluded_tolerance) {
-        row.error[k] = 0;
-        continue;
-      }
-    }
-    const bool insane = v.excluded && (*v.excluded)[particle];
-    const double score = insane ? infinity : score_of(row.error[k], v.tolerance[k]);
-    scores.push_back(score);
-    if (score > worst) {
-      worst = score;
-      row.value = row.error[k];
-      row.tolerance = v.tolerance[k];
-      row.worst_id = static_cast<std::int64_t>(particle);
-    }
-    if (v.float_value.size())
-      float_worst = std::max(
-          float_worst, score_of(std::abs(v.float_value[k] - v.expected[k]), v.tolerance[k]));
-  }
-  row.n = static_cast<std::int64_t>(scores.size());
-  row.score = std::max(worst, 0.0);
-  row.float_score = float_worst;
-  if (!scores.empty()) {
-    auto middle = scores.begin() + static_cast<std::ptrdiff_t>(scores.size() / 2);
-    std::nth_element(scores.begin(), middle, scores.end());
-    row.median_score = *middle;
-  }
-  row.verdict = row.score <= 1 ? Verdict::pass : Verdict::fail;
-  if (row.verdict == Verdict::fail) row.reason = "beyond tolerance";
-  if (scores.empty() && n > 0) {
-    row.verdict = Verdict::fail;
-    row.reason = "every particle is ambiguous, nothing could be compared";
-  }
-  if (v.excluded && !(row.excluded <= v.most_excluded)) {
-    row.verdict = Verdict::fail;
-    row.reason = std::to_string(row.excluded) + " ambiguous particles, at most " +
-                 std::to_string(v.most_excluded) + " expected";
-  }
-}
-
-/// Rows of one backend on one fixture, in order.
-class Sheet {
- public:
-  Sheet(const BackendInfo& info, const Fixture& fixture) {
-    common_.backend = info.name;
-    common_.options = info.options;
-    common_.executor = info.executor;
-    common_.device = info.device;
-    common_.fixture = fixture.name;
-  }
-
-  CheckRow& row(const char* check, const char* field, const char* unit) {
-    CheckRow& row = rows_.emplace_back(common_);
-    row.check = check;
-    row.field = field;
-    row.unit = unit;
-    row.float_score = std::nan("");
-    return row;
-  }
-
-  void failed(const char* check, const std::string& why) {
-    CheckRow& r = row(check, "all", "");
-    r.verdict = Verdict::fail;
-    r.score = infinity;
-    r.reason = why;
-  }
-
-  std::vector<CheckRow> take() { return std::move(rows_); }
-
- private:
-  CheckRow common_;
-  std::vector<CheckRow> rows_;
-};
 
 struct AccelerationField {
   const char* name;
@@ -326,7 +209,27 @@ std::string evaluate_oracle(const Scene& scene, const ParticleState& state, Fiel
   return why.empty() ? why : why + "no backend can pass (a lattice? let it move first)";
 }
 
-Judgement prepare(const Fixture& fixture) {
+namespace {
+
+/// The oracle's own run with the looks that a backend's run gets.
+void run_ahead(const Fixture& fixture, Judgement& j) {
+  for (auto left = static_cast<int>(fixture.ensemble.substeps); left > 0; left -= j.stretches.back())
+    j.stretches.push_back((left + 1) / 2);
+  Solver solver(fixture.scene, j.walls, fixture.state);
+  Audit audit(fixture.scene);
+  audit.look(fixture.state);
+  for (const int stretch : j.stretches) {
+    for (int k = 0; k < stretch; ++k) solver.substep();
+    j.later_look = audit.look(solver.state());
+    j.deepest = std::max(j.deepest, j.later_look.deepest);
+    j.crossed = std::max(j.crossed, j.later_look.crossed);
+  }
+  j.later = solver.state();
+}
+
+}  // namespace
+
+Judgement prepare(const Fixture& fixture, const CheckSelection& checks) {
   const Scene& scene = fixture.scene;
   Judgement j;
   j.walls = sample_walls(scene);
@@ -334,20 +237,35 @@ Judgement prepare(const Fixture& fixture) {
   require_reproduced(fixture, j.own);
   j.inputs.density = j.own.fields.density.cast<float>().cast<double>();
   j.inputs.pressure = j.own.fields.pressure.cast<float>().cast<double>();
-  j.given = answer(scene, j.walls, fixture.state, &j.inputs);
-  j.own_float = float_fields(scene, j.walls, fixture.state);
-  j.given_float = float_fields(scene, j.walls, fixture.state, &j.inputs);
-  j.substep = substep_answer(scene, fixture.state, j.own);
+  const auto wanted = [&](std::initializer_list<const char*> names) {
+    return std::any_of(names.begin(), names.end(),
+                       [&](const char* name) { return checks.count(name) > 0; });
+  };
+  if (wanted({"fields", "conservation"})) {
+    j.given = answer(scene, j.walls, fixture.state, &j.inputs);
+    j.given_float = float_fields(scene, j.walls, fixture.state, &j.inputs);
+  }
+  if (wanted({"fields"})) j.own_float = float_fields(scene, j.walls, fixture.state);
+  if (wanted({"substep"})) j.substep = substep_answer(scene, fixture.state, j.own);
+  if (wanted({"trajectory", "mass", "containment", "determinism"})) run_ahead(fixture, j);
+  if (wanted({"invariance"}))
+    for (TransformedProblem& problem : transformed_problems(scene, fixture.state)) {
+      Walls walls = sample_walls(problem.scene);
+      OracleAnswer its_answer = answer(problem.scene, walls, problem.state);
+      j.transformed.push_back({std::move(problem), std::move(walls), std::move(its_answer)});
+    }
   return j;
 }
 
-std::vector<CheckRow> judge(Backend& backend, const Fixture& fixture, const Judgement& oracle) {
+std::vector<CheckRow> judge(Backend& backend, const Fixture& fixture, const Judgement& oracle,
+                            const CheckSelection& checks) {
   std::optional<Sheet> sheet;
   try {
     sheet.emplace(backend.info(), fixture);
     backend.load(fixture.scene, oracle.walls, fixture.state);
-    judge_fields(backend, oracle, *sheet);
-    judge_substep(backend, fixture, oracle, *sheet);
+    if (checks.count("fields")) judge_fields(backend, oracle, *sheet);
+    if (checks.count("substep")) judge_substep(backend, fixture, oracle, *sheet);
+    judge_runs(backend, fixture, oracle, checks, *sheet);
   } catch (const std::exception& error) {
     if (!sheet) sheet.emplace(BackendInfo{}, fixture);  // it cannot even say what it is
     sheet->failed("run", error.what());

@@ -1,19 +1,29 @@
 /// \file
-/// One backend judged on one fixture, stage by stage: neighbors, boundary volume, density, pressure,
-/// accelerations from the oracle's own inputs, accelerations end to end, one substep.
+/// One backend judged on one fixture by the eight checks of checks.hpp.
 #pragma once
 
+#include "oracle/audit.hpp"
 #include "oracle/backend.hpp"
+#include "oracle/checks.hpp"
+#include "oracle/ensemble.hpp"
 #include "oracle/fixture.hpp"
 #include "oracle/report.hpp"
 #include "oracle/substep_answer.hpp"
 #include "oracle/tolerance.hpp"
+#include "oracle/transformed.hpp"
 
 #include <memory>
 #include <string>
 #include <vector>
 
 namespace decant {
+
+/// The oracle's answer to the same problem told otherwise.
+struct TransformedAnswer {
+  TransformedProblem problem;
+  Walls walls;
+  OracleAnswer answer;
+};
 
 /// Everything the oracle has to say about one fixture. Made once, used for every backend.
 struct Judgement {
@@ -23,6 +33,14 @@ struct Judgement {
   OracleAnswer given;   // accelerations from those inputs
   Fields own_float, given_float;  // the same source in sequential fp32
   SubstepAnswer substep;
+  // The oracle's own run, as long as the fixture's ensemble is, and looked at as backends' runs are:
+  // after half of it, half of the rest, and so on.
+  std::vector<int> stretches;
+  ParticleState later;
+  AuditResult later_look;
+  double deepest = 0;  // m, inside a wall, at any look
+  std::int64_t crossed = 0;
+  std::vector<TransformedAnswer> transformed;
 };
 
 /// Fields and condition sums at one state, as a fixture records them. Returns why no backend can
@@ -31,16 +49,18 @@ struct Judgement {
 std::string evaluate_oracle(const Scene& scene, const ParticleState& state, Fields& fields,
                             ConditionSums& condition);
 
-/// Evaluates the oracle on the fixture's state. Throws InputError where the recorded fields are not
-/// what this build's reference gives within the tolerances scaled from 2⁻²⁴ to 2⁻⁵³.
-Judgement prepare(const Fixture& fixture);
+/// Evaluates the oracle on the fixture's state, as far as these checks need it. Throws InputError where
+/// the recorded fields are not what this build's reference gives within the tolerances scaled from 2⁻²⁴
+/// to 2⁻⁵³.
+Judgement prepare(const Fixture& fixture, const CheckSelection& checks = all_checks());
 
 /// Loads the fixture into the backend and compares; a backend that throws or reports trouble gives
-/// rows with verdict fail and the reason. The checks are, in this order:
+/// rows with verdict fail and the reason. Rows of the check `fields` carry the stage's name:
 ///   neighbors, boundary_volume, density, pressure   as the backend computes them
 ///   acceleration    from the oracle's density and pressure
 ///   evaluation      from the backend's own
-///   substep         position and velocity one substep on, walls and contact included
-std::vector<CheckRow> judge(Backend& backend, const Fixture& fixture, const Judgement& oracle);
+/// \param oracle  prepared for these checks at least
+std::vector<CheckRow> judge(Backend& backend, const Fixture& fixture, const Judgement& oracle,
+                            const CheckSelection& checks = all_checks());
 
 }  // namespace decant

@@ -66,7 +66,8 @@ std::string fitted(const std::string& text, std::size_t width) {
   return text.substr(0, width - 2 - tail) + ".." + text.substr(text.size() - tail);
 }
 
-/// Text broken at spaces, every line after the indent, none wider than the table.
+}  // namespace
+
 std::string wrapped(const std::string& text, std::size_t indent) {
   std::string out, line;
   const std::size_t room = widest - indent;
@@ -90,6 +91,8 @@ std::string wrapped(const std::string& text, std::size_t indent) {
   if (!line.empty()) flush();
   return out;
 }
+
+namespace {
 
 std::string check_name(const CheckRow& row) {
   return row.check == row.field || row.field.empty() ? row.check : row.check + " / " + row.field;

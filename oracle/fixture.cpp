@@ -167,6 +167,19 @@ void check_fixture(const Fixture& f, Eigen::Index walls, const Fail& fail) {
   if (f.state.substep < 0) fail("/state@substep", std::to_string(f.state.substep), ">= 0");
   check("/state/position", f.state.position, "");
   check("/state/velocity", f.state.velocity, "");
+  const auto ensemble = [&](const char* name, std::int64_t value, std::int64_t least) {
+    if (value < least || value > 10'000)
+      fail(std::string("/ensemble@") + name, std::to_string(value),
+           fmt::format("in {} … 10000", least));
+  };
+  ensemble("substeps", f.ensemble.substeps, 1);
+  ensemble("members", f.ensemble.members, 2);
+  for (std::size_t k = 0; k < f.ensemble.mean.size(); ++k)
+    for (const auto& [name, value] : {std::pair{"mean", f.ensemble.mean[k]},
+                                      std::pair{"deviation", f.ensemble.deviation[k]}})
+      if (!(value >= 0 && std::isfinite(value)))
+        fail(std::string("/ensemble/") + name, fmt::format("{:.9g} at {}", value, k),
+             "finite, >= 0");
   if (f.fields) {
     if (!f.condition) fail("/condition", "missing", "required beside /oracle");
     for_each_field(*f.fields, check);
@@ -221,6 +234,14 @@ Eigen::Index read_walls(const Hdf5Reader& in, const Scene& scene) {
   return walls.size();
 }
 
+constexpr Eigen::Index five = std::tuple_size_v<Divergence>;
+
+Divergence measures(const Eigen::VectorXd& values) {
+  Divergence d{};
+  for (Eigen::Index k = 0; k < five; ++k) d[static_cast<std::size_t>(k)] = values[k];
+  return d;
+}
+
 }  // namespace
 
 Fixture read_fixture(const std::filesystem::path& file) {
@@ -261,6 +282,10 @@ Fixture read_fixture(const std::filesystem::path& file) {
     for_each_sample(f, Get{in, f.sample_id.size(), walls});
     f.fields_digest = in.text_attribute("/sample", "fields_sha256");
   }
+  f.ensemble.substeps = in.integer_attribute("/ensemble", "substeps");
+  f.ensemble.members = in.integer_attribute("/ensemble", "members");
+  f.ensemble.mean = measures(in.vector("/ensemble/mean", five));
+  f.ensemble.deviation = measures(in.vector("/ensemble/deviation", five));
   check_fixture(f, walls, fail);
   return f;
 }
@@ -291,6 +316,14 @@ void write_fixture(const std::filesystem::path& file, const Fixture& f) {
     for_each_sample(f, Put{out});
     out.attribute("/sample", "fields_sha256", f.fields_digest);
   }
+  out.attribute("/ensemble", "substeps", f.ensemble.substeps);
+  out.attribute("/ensemble", "members", f.ensemble.members);
+  const auto measures_text = "rms_position (m), p99_position, rms_velocity (m/s), p99_velocity, energy (J)";
+  out.vector("/ensemble/mean", Eigen::Map<const Eigen::VectorXd>(f.ensemble.mean.data(), five), "",
+             measures_text);
+  out.vector("/ensemble/deviation",
+             Eigen::Map<const Eigen::VectorXd>(f.ensemble.deviation.data(), five), "",
+             measures_text);
   auto provenance = f.provenance;
   provenance["scene_sha256"] = sha256_of_text(scene_text);
   for (const auto& [name, text] : provenance) out.attribute("/provenance", name, text);

@@ -3,6 +3,7 @@
 /// layout is in fixture-format.md.
 #pragma once
 
+#include "oracle/ensemble.hpp"
 #include "reference/scene.hpp"
 #include "reference/state.hpp"
 
@@ -26,7 +27,7 @@ struct ConditionSums {
 };
 
 /// Schema version of fixture files; a reader refuses any other.
-inline constexpr std::int64_t fixture_schema = 1;
+inline constexpr std::int64_t fixture_schema = 2;
 
 struct Fixture {
   std::string name;    // file name without ".h5", filled by read_fixture
@@ -43,6 +44,7 @@ struct Fixture {
   Eigen::VectorXd sample_density, sample_pressure;
   Eigen::Matrix3Xd sample_acceleration;
   std::string fields_digest;  // study scale: digest_of of all fields
+  Ensemble ensemble;          // of disturbed runs from here on
   /// version, compiler, flags, …; scene_sha256 is set by write_fixture.
   std::map<std::string, std::string> provenance;
 

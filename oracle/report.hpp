@@ -79,6 +79,9 @@ Report read_report(const std::filesystem::path& file);
 /// at most 100 columns.
 std::string console_table(const Report& report);
 
+/// Text broken at spaces, every line after the indent, none wider than the table.
+std::string wrapped(const std::string& text, std::size_t indent);
+
 /// The last line of the table: "6 fixtures × 1 backend: pass".
 std::string verdict_line(const Report& report);
 

@@ -61,6 +61,9 @@ class Solver {
   /// Semi-implicit Euler: v += a dt, x += v dt, wrap, collide at t + dt.
   void substep();
 
+  /// From another state of the same number of particles.
+  void restart(const ParticleState& state) { state_ = state; }
+
   const ParticleState& state() const { return state_; }
   const Neighbors& neighbors() const { return neighbors_; }
   const Eigen::VectorXd& volumes() const { return volumes_; }

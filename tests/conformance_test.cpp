@@ -23,14 +23,19 @@ namespace decant {
 namespace {
 
 /// Every row that did not pass, in words; empty where all did.
-std::string objections(Backend& backend, const Fixture& fixture) {
+std::string objections(Backend& backend, const Fixture& fixture, const Judgement& oracle,
+                       const CheckSelection& checks) {
   std::string all;
-  for (const CheckRow& row :
-       judge(backend, fixture, *std::make_unique<Judgement>(prepare(fixture))))
+  for (const CheckRow& row : judge(backend, fixture, oracle, checks))
     if (judged_verdict(row) != Verdict::pass)
       all += row.check + " " + row.field + ": score " + std::to_string(row.score) + " at " +
              std::to_string(row.worst_id) + " " + row.reason + "\n";
   return all;
+}
+
+std::string objections(Backend& backend, const Fixture& fixture) {
+  const CheckSelection checks{"fields", "substep"};
+  return objections(backend, fixture, *std::make_unique<Judgement>(prepare(fixture, checks)), checks);
 }
 
 /// A fixture of the state with the oracle's answer, as `record` makes it.
@@ -43,7 +48,7 @@ Fixture answered(Fixture fixture) {
 TEST(Fixtures, AreReproducedByTheReferenceOfToday) {
   const auto files = fixtures_in(fixture_folder(), false);
   EXPECT_GE(files.size(), 6u);
-  for (const auto& file : files) EXPECT_NO_THROW(prepare(read_fixture(file))) << file;
+  for (const auto& file : files) EXPECT_NO_THROW(prepare(read_fixture(file), {"fields"})) << file;
 }
 
 TEST(Fixtures, AreRefusedWhereTheReferenceSaysOtherwise) {
@@ -78,6 +83,17 @@ TEST_P(Conformance, HoldsOnEverySmallFixture) {
   const auto tested = backend();
   for (const auto& file : fixtures_in(fixture_folder(), false))
     EXPECT_EQ(objections(*tested, read_fixture(file)), "") << file;
+}
+
+TEST_P(Conformance, HoldsInEveryCheck) {
+  // Rebuilt every so many substeps, whatever moves, a list misses pairs in a run.
+  const bool may_miss = std::get<0>(GetParam()).find("rebuild=") != std::string::npos;
+  CheckSelection checks = all_checks();
+  if (may_miss) checks.erase("trajectory");
+  static const Fixture fixture = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-splash.h5");
+  static const Judgement oracle = prepare(fixture);
+  const auto tested = backend();
+  EXPECT_EQ(objections(*tested, fixture, oracle, checks), "");
 }
 
 TEST_P(Conformance, HoldsOnRandomScenes) {

@@ -81,8 +81,8 @@ TEST_F(DamagedFixture, AChunkThatInflatesToLessThanItIsIsRefused) {
 }
 
 TEST_F(DamagedFixture, AnotherSchemaVersionIsRefused) {
-  set_attribute("/", "decant_fixture", H5T_NATIVE_INT64, std::int64_t{2});
-  expect_refused("/@decant_fixture", "2", "1");
+  set_attribute("/", "decant_fixture", H5T_NATIVE_INT64, std::int64_t{1});
+  expect_refused("/@decant_fixture", "1", "2");
 }
 
 TEST_F(DamagedFixture, AnotherProgramsFileIsRefused) {

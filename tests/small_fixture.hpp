@@ -72,6 +72,7 @@ inline Fixture small_fixture() {
   sums.pressure_acceleration = fields.acceleration.cwiseAbs();
   sums.viscous_acceleration = sums.wall_pressure_acceleration = sums.wall_viscous_acceleration =
       sums.pressure_acceleration;
+  f.ensemble = {20, 8, {1e-8, 2e-8, 3e-7, 4e-7, 5e-9}, {1e-9, 2e-9, 3e-8, 4e-8, 5e-10}};
   f.provenance = {{"version", "0"}, {"compiler", "g++"}};
   return f;
 }

@@ -24,8 +24,8 @@ namespace {
 
 struct ConformArguments {
   BackendFlags flags;
-  std::vector<std::string> fixtures, backends;
-  std::string executor = "auto", report;
+  std::vector<std::string> fixtures, backends, checks;
+  std::string executor = "auto", report, explain;
   bool all = false, json = false, quiet = false;
 };
 
@@ -33,7 +33,8 @@ constexpr const char* footer =
     "Without FIXTURE the small recordings beside the binary are judged (or those in the folder "
     "that\n"
     "DECANT_FIXTURES names), with --all every one. A check passes where no error exceeds its own\n"
-    "tolerance: score = largest |error| / tolerance <= 1.\n"
+    "tolerance: score = largest |error| / tolerance <= 1. Checks: fields, substep, trajectory, mass,\n"
+    "containment, conservation, determinism, invariance.\n"
     "Exit status: 0 all pass, 1 something does not conform, 2 bad input, 3 something could not "
     "run\n"
     "(a backend that breaks down while it is judged does not conform),\n"
@@ -108,7 +109,7 @@ CheckRow row_that_did_not_run(const Candidate& candidate, const Fixture& fixture
 }
 
 Report judge_all(std::vector<Candidate>& candidates, const std::vector<Fixture>& fixtures,
-                 bool quiet) {
+                 const CheckSelection& checks, bool quiet) {
   Report report;
   const auto total = static_cast<std::int64_t>(candidates.size() * fixtures.size());
   const bool any = std::any_of(candidates.begin(), candidates.end(),
@@ -117,14 +118,14 @@ Report judge_all(std::vector<Candidate>& candidates, const std::vector<Fixture>&
   std::int64_t done = 0;
   for (const Fixture& fixture : fixtures) {
     std::unique_ptr<const Judgement> oracle;
-    if (any) oracle = std::make_unique<const Judgement>(prepare(fixture));
+    if (any) oracle = std::make_unique<const Judgement>(prepare(fixture, checks));
     for (Candidate& candidate : candidates) {
       progress.update(done++, fixture.name + " " + candidate.info.name);
       if (!candidate.backend) {
         report.rows.push_back(row_that_did_not_run(candidate, fixture));
         continue;
       }
-      for (CheckRow& row : judge(*candidate.backend, fixture, *oracle)) {
+      for (CheckRow& row : judge(*candidate.backend, fixture, *oracle, checks)) {
         condense(row);
         report.rows.push_back(std::move(row));
       }
@@ -186,7 +187,22 @@ std::string json_text(const Report& report, int status) {
   return all.dump(2);
 }
 
+/// What a check compares, its bound and where that comes from, in lines a terminal holds.
+int explain(const std::string& name) {
+  const auto chosen = parse_checks({name});
+  for (const auto& check : check_descriptions()) {
+    if (!chosen.count(check.name)) continue;
+    fmt::print("{}\n{}", check.name, wrapped(check.compares, 2));
+    fmt::print("bound\n{}", wrapped(check.bound, 2));
+    fmt::print("does not see\n{}", wrapped(check.blind, 2));
+  }
+  return exit_pass;
+}
+
 int conform(ConformArguments& arguments) {
+  if (!arguments.explain.empty()) return explain(arguments.explain);
+  const CheckSelection checks =
+      arguments.checks.empty() ? all_checks() : parse_checks(arguments.checks);
   check_output_place("--report", arguments.report);
   auto candidates = candidates_of(arguments);
   const auto fixtures = fixtures_of(arguments);
@@ -197,7 +213,7 @@ int conform(ConformArguments& arguments) {
                  c.backend ? fmt::format("{} on {}", c.info.executor, c.info.device) : c.why_not);
   std::fflush(stdout);
 
-  Report report = judge_all(candidates, fixtures, !talks);
+  Report report = judge_all(candidates, fixtures, checks, !talks);
   add_provenance(report, candidates, fixtures);
   const int status = status_of(report, candidates);
   if (arguments.json)
@@ -224,6 +240,11 @@ void add_conform_command(CLI::App& app, int& exit_status) {
       ->delimiter(',')
       ->allow_extra_args(false);
   verb->add_option("--executor", arguments->executor, "auto, cuda or host")->capture_default_str();
+  verb->add_option("--check", arguments->checks, "fields,substep,…; default: all eight")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  verb->add_option("--explain", arguments->explain,
+                   "say what a check compares and why its bound is what it is; judges nothing");
   arguments->flags.add_to(*verb);
   verb->add_option("--report", arguments->report, "write an HDF5 report");
   verb->add_flag("--json", arguments->json, "rows as JSON instead of the table");

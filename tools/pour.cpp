@@ -317,6 +317,8 @@ void Pour::dump(const std::string& trouble, const ParticleState& good) {
     fixture.state = good;
     fixture.state.quantise();
     evaluate_oracle(scene_, fixture.state, fixture.fields.emplace(), fixture.condition.emplace());
+    // A short one: whoever replays this state looks at what comes next.
+    fixture.ensemble = run_ensemble(scene_, sample_walls(scene_), fixture.state, 4, 4);
     if (good.size() > largest_whole_dump) reduce_to_sample(fixture);
     fixture.provenance = {{"trouble", trouble},
                           {"backend", info.name},

@@ -18,6 +18,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -28,6 +29,8 @@ namespace {
 struct RecordArguments {
   std::string scene, out, from, backend = "reference", executor = "auto";
   std::vector<std::string> phases;
+  // Long enough to show a viscosity wrong by 1 % in the energy of every phase, short enough for CI.
+  std::int64_t ensemble_substeps = 32, ensemble_members = 24;
   bool sample = false, quiet = false;
 };
 
@@ -47,6 +50,7 @@ struct Start {
   ParticleState state;
   std::string phase;   // of a fixture, else empty
   std::string origin;  // for the provenance
+  std::map<std::string, std::string> provenance;  // of a fixture
 };
 
 /// The last frame of a finished pour at or before the first phase asked for.
@@ -72,24 +76,26 @@ ParticleState state_in_frames(const Hdf5Reader& frames, const Scene& scene,
 }
 
 Start start_of(const RecordArguments& arguments, const Scene& scene) {
-  if (arguments.from.empty()) return {initial_state(scene), {}, "the scene's initial state"};
+  if (arguments.from.empty()) return {initial_state(scene), {}, "the scene's initial state", {}};
   const std::string& file = arguments.from;
   const Hdf5Reader reader(file);
   if (reader.has("/fluid/position")) {
     const auto name = [&](const char* attribute) { return reader.text_attribute("/", attribute); };
     return {state_in_frames(reader, scene, arguments.phases), {},
             fmt::format("a frame of {} on {} ({}, {})", name("backend"), name("device"),
-                        name("executor"), name("precision"))};
+                        name("executor"), name("precision")), {}};
   }
   const auto take = [&](ParticleState state, const std::string& scene_json, std::string phase) {
     if (scene_json != scene_to_json(scene))
       throw InputError(file, "scene", "another scene", "the scene of " + arguments.scene);
     return Start{std::move(state), std::move(phase),
-                 std::filesystem::path(file).filename().string() + " " + sha256_of_file(file)};
+                 std::filesystem::path(file).filename().string() + " " + sha256_of_file(file), {}};
   };
   if (reader.has_attribute("/", "decant_fixture")) {
     Fixture fixture = read_fixture(file);
-    return take(std::move(fixture.state), scene_to_json(fixture.scene), fixture.phase);
+    Start taken = take(std::move(fixture.state), scene_to_json(fixture.scene), fixture.phase);
+    taken.provenance = std::move(fixture.provenance);
+    return taken;
   }
   Checkpoint checkpoint = read_checkpoint(file);
   return take(std::move(checkpoint.state), checkpoint.scene_json, {});
@@ -168,7 +174,8 @@ int record(const RecordArguments& arguments) {
                start.state.size());
   std::fflush(stdout);
 
-  backend->load(scene, sample_walls(scene), start.state);
+  const Walls walls = sample_walls(scene);
+  backend->load(scene, walls, start.state);
   std::int64_t now = start.state.substep;
   Progress progress("substep", phases.back().substep, now, arguments.quiet);
   for (const Phase& phase : phases) {
@@ -181,8 +188,14 @@ int record(const RecordArguments& arguments) {
     fixture.state.quantise();
     const std::string weakness = evaluate_oracle(scene, fixture.state, fixture.fields.emplace(),
                                                  fixture.condition.emplace());
+    fixture.ensemble = run_ensemble(scene, walls, fixture.state, arguments.ensemble_substeps,
+                                    arguments.ensemble_members);
     if (arguments.sample) reduce_to_sample(fixture);
     fixture.provenance = provenance_of(arguments, info, start);
+    // Recorded anew from a fixture as it is: what brought the fluid there stays true.
+    if (phase.substep == start.state.substep)
+      for (const auto& [key, value] : start.provenance)
+        if (key.starts_with("advanced_") || key == "started_from") fixture.provenance[key] = value;
     const std::string file = phase_file(arguments.out, phase.name);
     write_fixture(file, fixture);
     progress.pause();
@@ -211,6 +224,13 @@ void add_record_command(CLI::App& app, int& exit_status) {
       ->capture_default_str();
   verb->add_option("--executor", arguments->executor, "auto, cuda or host")->capture_default_str();
   verb->add_flag("--sample", arguments->sample, "study scale: a digest and a sample of the fields");
+  verb->add_option("--ensemble-substeps", arguments->ensemble_substeps,
+                   "how long the disturbed runs of the trajectory check are")
+      ->check(CLI::Range(1, 10'000))
+      ->capture_default_str();
+  verb->add_option("--ensemble-members", arguments->ensemble_members, "how many they are")
+      ->check(CLI::Range(2, 10'000))
+      ->capture_default_str();
   verb->add_flag("--quiet", arguments->quiet, "no output");
   verb->callback([arguments, &exit_status] { exit_status = record(*arguments); });
 }

@@ -1,0 +1,90 @@
+/// \file
+/// What `decant conform --explain` says.
+#include "oracle/checks.hpp"
+
+#include "reference/error.hpp"
+
+#include <algorithm>
+
+namespace decant {
+
+const std::vector<CheckDescription>& check_descriptions() {
+  static const std::vector<CheckDescription> checks = {
+      {"fields",
+       "Neighbor counts and id sums, boundary volumes, density, pressure and the four parts of the "
+       "acceleration at the recorded state, particle by particle: first every stage from the "
+       "backend's own stage before (neighbors, boundary_volume, density, pressure, evaluation), and "
+       "the accelerations once more from the oracle's density and pressure (acceleration), so that "
+       "the first wrong stage is named.",
+       "A sum of n terms differs in fp32, in any order, by about (√n + c) u Σ|t|(1 + κ): n, Σ|t| and "
+       "the terms' own condition κ = r|f'|/f are summed by the oracle for every particle (Higham, "
+       "Accuracy and Stability, §3–4; √n: Higham & Mary 2019); c counts the roundings inside a term, "
+       "6 of a product, 8 of a vector with a quotient. Poses of moving walls, the equation of state "
+       "and what pressure hands on to accelerations have terms of their own (oracle/tolerance.hpp). "
+       "Integers are exact, but for particles that own a pair too near H for fp32 to place; their "
+       "number is bounded by four times what a fluid of this density has.",
+       "A factor of 1 + 1e-5 on G or on the stiffness B."},
+      {"substep",
+       "Positions and velocities one substep on: integration, moving walls, contact.",
+       "tau_v = dt tau_a + 2u(|v| + dt|a|), tau_x = dt tau_v + 2u(|x| + dt|v|), and what a contact "
+       "adds (oracle/substep_answer.hpp). Where fp32 cannot tell whether a particle touches, either "
+       "answer may be given, each with its own narrow tolerance.",
+       "What only shows over many substeps."},
+      {"trajectory",
+       "How far the backend is from the oracle after some tens of substeps: RMS and 99th percentile of "
+       "position and velocity, and the total energy.",
+       "3 (mean + 6 standard deviations) of an ensemble of oracle runs recorded in the fixture: x and v "
+       "disturbed by fp32's rounding before every substep, and every constant once. The 3 is √9, the "
+       "roundings of a contact beside the one that a disturbance stands for (oracle/ensemble.hpp). RMS "
+       "and percentile, because the maximum over thousands of particles is decided by one collision. A "
+       "viscosity wrong by 1 % shows in the energy of settled and splashing fluid.",
+       "An error below rounding, however systematic."},
+      {"mass",
+       "After the run every id is there once, finite and inside the domain; the particles of all places "
+       "(source, in flight, receiver, spilled, lost) add up to all particles.",
+       "Exact: counts.",
+       "Two ids exchanged (fields and substep see that)."},
+      {"containment",
+       "Depth inside any wall and paths through walls during the run, judged in double from positions and "
+       "from the way between two looks, in each container's own frame.",
+       "No deeper, and no more crossings, than the oracle's own run shows.",
+       "What happens between two looks and is undone."},
+      {"conservation",
+       "The forces between fluid particles add up to nothing, pressure and viscosity apart: momentum.",
+       "√Σ tau_i² of the particles' own tolerances: rounding errors of different particles are "
+       "independent.",
+       "A factor on all forces."},
+      {"determinism",
+       "Two evaluations and two runs from the same state give the same bits.",
+       "Exact: the number of values that differ is 0.",
+       "A race that did not happen this time."},
+      {"invariance",
+       "Density, pressure and acceleration of the same state with its ids permuted, moved by half a "
+       "meter along every axis, and turned by a quarter about z, each against the oracle's answer to "
+       "the changed problem.",
+       "That answer's own tolerances; moved states are rounded to fp32 first, for both sides.",
+       "What is wrong in the same way everywhere."},
+  };
+  return checks;
+}
+
+CheckSelection all_checks() {
+  CheckSelection all;
+  for (const auto& check : check_descriptions()) all.insert(check.name);
+  return all;
+}
+
+CheckSelection parse_checks(const std::vector<std::string>& names) {
+  const CheckSelection all = all_checks();
+  std::string known;
+  for (const auto& check : check_descriptions())
+    known += (known.empty() ? "" : ", ") + std::string(check.name);
+  CheckSelection chosen;
+  for (const auto& name : names) {
+    if (!all.count(name)) throw InputError("command line", "--check", name, "one of " + known);
+    chosen.insert(name);
+  }
+  return chosen;
+}
+
+}  // namespace decant

@@ -1,0 +1,30 @@
+/// \file
+/// The eight checks by name, and what each compares and why its bound is what it is.
+#pragma once
+
+#include <set>
+#include <string>
+#include <vector>
+
+namespace decant {
+
+struct CheckDescription {
+  const char* name;
+  const char* compares;
+  const char* bound;   // and where it comes from
+  const char* blind;   // what this check cannot see
+};
+
+/// In the order in which they are made: fields, substep, trajectory, mass, containment,
+/// conservation, determinism, invariance.
+const std::vector<CheckDescription>& check_descriptions();
+
+/// Names of checks that are wanted.
+using CheckSelection = std::set<std::string>;
+
+CheckSelection all_checks();
+
+/// Throws InputError naming the check that does not exist.
+CheckSelection parse_checks(const std::vector<std::string>& names);
+
+}  // namespace decant

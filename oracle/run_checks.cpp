@@ -1,0 +1,253 @@
+/// \file
+/// Runs of some tens of substeps, looked at on the way.
+#include "oracle/run_checks.hpp"
+
+#include "oracle/audit.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+namespace decant {
+namespace {
+
+/// What a run left behind.
+struct Run {
+  Status status;
+  ParticleState first, end;  // after the first stretch, after all
+  std::vector<AuditResult> looks;
+};
+
+Run run(Backend& backend, const Scene& scene, const Walls& walls, const ParticleState& start,
+        const std::vector<int>& stretches) {
+  Run r;
+  backend.load(scene, walls, start);
+  Audit audit(scene);
+  audit.look(start);
+  for (const int stretch : stretches) {
+    r.status = backend.advance(stretch);
+    if (!r.status.ok()) return r;
+    backend.read(r.end);
+    if (r.end.position.cols() != start.size() || r.end.velocity.cols() != start.size()) return r;
+    if (r.looks.empty()) r.first = r.end;
+    r.looks.push_back(audit.look(r.end));
+  }
+  return r;
+}
+
+/// Bits that differ, value by value.
+std::int64_t differing(const Eigen::Ref<const Eigen::MatrixXd>& a,
+                       const Eigen::Ref<const Eigen::MatrixXd>& b) {
+  if (a.rows() != b.rows() || a.cols() != b.cols()) return std::max(a.size(), b.size());
+  std::int64_t count = 0;
+  for (Eigen::Index c = 0; c < a.cols(); ++c)
+    for (Eigen::Index r = 0; r < a.rows(); ++r)
+      count += std::bit_cast<std::uint64_t>(a(r, c)) != std::bit_cast<std::uint64_t>(b(r, c));
+  return count;
+}
+
+void judge_trajectory(const Run& r, const Fixture& fixture, const Judgement& oracle, Sheet& sheet) {
+  const Divergence apart = divergence(fixture.scene, r.end, oracle.later);
+  const Divergence bound = divergence_bound(fixture.ensemble);
+  for (std::size_t k = 0; k < apart.size(); ++k) {
+    CheckRow& row = sheet.row("trajectory", divergence_names[k], divergence_units[k]);
+    compare(apart[k], bound[k], row);
+    if (row.verdict == Verdict::fail)
+      row.reason = fmt::format(
+          "{} substeps on; {} disturbed runs of the oracle are apart by {:.3g} ± {:.2g}",
+          fixture.ensemble.substeps, fixture.ensemble.members, fixture.ensemble.mean[k],
+          fixture.ensemble.deviation[k]);
+  }
+}
+
+/// Particles that have both position and velocity of another one, bit for bit.
+std::int64_t doubled(const ParticleState& s, std::int64_t& one) {
+  std::vector<std::array<double, 6>> all(static_cast<std::size_t>(s.size()));
+  std::vector<std::size_t> order(all.size());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    order[i] = i;
+    for (int c = 0; c < 3; ++c) {
+      all[i][static_cast<std::size_t>(c)] = s.position(c, static_cast<Eigen::Index>(i));
+      all[i][static_cast<std::size_t>(c) + 3] = s.velocity(c, static_cast<Eigen::Index>(i));
+    }
+  }
+  const auto before = [&](std::size_t a, std::size_t b) {
+    return std::memcmp(&all[a], &all[b], sizeof all[a]) < 0;
+  };
+  std::sort(order.begin(), order.end(), before);
+  std::int64_t count = 0;
+  for (std::size_t k = 1; k < order.size(); ++k) {
+    if (before(order[k - 1], order[k])) continue;
+    one = static_cast<std::int64_t>(order[k]);
+    ++count;
+  }
+  return count;
+}
+
+void judge_mass(const Run& r, const Fixture& fixture, const Judgement& oracle, Sheet& sheet) {
+  const auto n = fixture.state.size();
+  const auto exact = [&](const char* field, std::int64_t off, const std::string& why,
+                         std::int64_t id) {
+    CheckRow& row = sheet.row("mass", field, "1");
+    compare(static_cast<double>(off), 0, row, id);
+    row.n = n;
+    if (off != 0) row.reason = fmt::format("{} {}", off, why);
+  };
+  std::int64_t bad = 0, bad_id = -1, one = -1;
+  for (Eigen::Index i = n; i-- > 0;)
+    if (!r.end.position.col(i).allFinite() || !r.end.velocity.col(i).allFinite()) {
+      ++bad;
+      bad_id = i;
+    }
+  exact("finite", bad, "particles are no numbers", bad_id);
+  std::int64_t expected_one = -1;
+  const std::int64_t twins = doubled(oracle.later, expected_one);
+  exact("distinct", std::max<std::int64_t>(0, doubled(r.end, one) - twins),
+        "particles are another one's copy", one);
+  const AuditResult& last = r.looks.back();
+  std::int64_t total = 0;
+  for (const auto count : last.particles_at) total += count;
+  exact("places", std::abs(total - n), "particles are in no place or in two", -1);
+  const auto lost = static_cast<std::size_t>(Place::lost);
+  exact("lost",
+        std::max<std::int64_t>(0, last.particles_at[lost] - oracle.later_look.particles_at[lost]),
+        "particles more than the oracle's are outside the domain", -1);
+}
+
+void judge_containment(const Run& r, const Judgement& oracle, Sheet& sheet) {
+  double deepest = 0;
+  std::int64_t deepest_id = -1, crossed = 0, crossed_id = -1, when = -1, substep = 0;
+  for (std::size_t k = 0; k < r.looks.size(); ++k) {
+    const AuditResult& look = r.looks[k];
+    substep += oracle.stretches[k];
+    if (look.deepest > deepest) {
+      deepest = look.deepest;
+      deepest_id = look.deepest_particle;
+    }
+    if (look.crossed > 0 && when < 0) {
+      when = substep;
+      crossed_id = look.first_crossed;
+    }
+    crossed = std::max(crossed, look.crossed);
+  }
+  CheckRow& depth = sheet.row("containment", "depth", "m");
+  compare(std::max(0.0, deepest - oracle.deepest), 0, depth, deepest_id);
+  if (depth.verdict == Verdict::fail)
+    depth.reason = fmt::format("{:.3g} m inside a wall, the oracle's run {:.3g} m", deepest,
+                               oracle.deepest);
+  CheckRow& paths = sheet.row("containment", "crossings", "1");
+  compare(static_cast<double>(std::max<std::int64_t>(0, crossed - oracle.crossed)), 0, paths,
+          crossed_id);
+  if (paths.verdict == Verdict::fail)
+    paths.reason = fmt::format("{} particles went through a wall, first seen {} substeps on", crossed,
+                               when);
+}
+
+void judge_conservation(Backend& backend, const Fixture& fixture, const Judgement& oracle,
+                        Sheet& sheet) {
+  backend.load(fixture.scene, oracle.walls, fixture.state);
+  const auto n = oracle.given.fields.density.size(), m = oracle.own.fields.boundary_volume.size();
+  Fields got = Fields::unwritten(n, m);
+  if (const Status status = backend.evaluate(got, &oracle.inputs); !status.ok())
+    return sheet.failed("conservation", describe(status));
+  const auto momentum = [&](const char* name, Eigen::Matrix3Xd Fields::*field) {
+    Values v;
+    const double mass = fixture.scene.particle_mass();
+    v.got = mass * (got.*field).rowwise().sum();
+    v.expected = mass * (oracle.given.fields.*field).rowwise().sum();
+    v.tolerance = mass * (oracle.given.tolerance.*field).rowwise().norm();
+    v.float_value = mass * (oracle.given_float.*field).rowwise().sum();
+    v.components = 3;
+    CheckRow& row = sheet.row("conservation", name, "N");
+    compare(v, row);
+    row.worst_id = -1;
+  };
+  if (got.pressure_acceleration.cols() != n || got.viscous_acceleration.cols() != n)
+    return sheet.failed("conservation", "accelerations of another number of particles");
+  momentum("pressure_momentum", &Fields::pressure_acceleration);
+  momentum("viscous_momentum", &Fields::viscous_acceleration);
+}
+
+void judge_determinism(Backend& backend, const Fixture& fixture, const Judgement& oracle,
+                       const Run& first, Sheet& sheet) {
+  const auto n = oracle.own.fields.density.size(), m = oracle.own.fields.boundary_volume.size();
+  std::array<Fields, 2> fields{Fields::unwritten(n, m), Fields::unwritten(n, m)};
+  for (Fields& f : fields) {
+    backend.load(fixture.scene, oracle.walls, fixture.state);
+    if (const Status status = backend.evaluate(f); !status.ok())
+      return sheet.failed("determinism", describe(status));
+  }
+  const auto exact = [&](const char* name, std::int64_t differ) {
+    CheckRow& row = sheet.row("determinism", name, "1");
+    compare(static_cast<double>(differ), 0, row);
+    row.n = n;
+    if (differ != 0) row.reason = fmt::format("{} values differ from the first time", differ);
+  };
+  const Fields &a = fields[0], &b = fields[1];
+  exact("fields", differing(a.density, b.density) + differing(a.pressure, b.pressure) +
+                      differing(a.acceleration, b.acceleration) +
+                      differing(a.boundary_volume, b.boundary_volume));
+  const Run second = run(backend, fixture.scene, oracle.walls, fixture.state,
+                         {oracle.stretches.front()});
+  if (!second.status.ok()) return sheet.failed("determinism", describe(second.status));
+  exact("run", differing(first.first.position, second.first.position) +
+                   differing(first.first.velocity, second.first.velocity));
+}
+
+void judge_invariance(Backend& backend, const Judgement& oracle, Sheet& sheet) {
+  for (const TransformedAnswer& t : oracle.transformed) {
+    const auto n = t.answer.fields.density.size(), m = t.answer.fields.boundary_volume.size();
+    backend.load(t.problem.scene, t.walls, t.problem.state);
+    Fields got = Fields::unwritten(n, m);
+    if (const Status status = backend.evaluate(got); !status.ok())
+      return sheet.failed("invariance", t.problem.name + ": " + describe(status));
+    const auto row = [&](const char* field, const char* unit) -> CheckRow& {
+      return sheet.row("invariance", t.problem.name + " " + field, unit);
+    };
+    const Fields &expected = t.answer.fields, &bound = t.answer.tolerance;
+    compare({got.density, expected.density, bound.density, {}, 1}, row("density", "kg/m^3"));
+    compare({got.pressure, expected.pressure, bound.pressure, {}, 1}, row("pressure", "Pa"));
+    compare({flat(got.acceleration), flat(expected.acceleration), flat(bound.acceleration), {}, 3},
+            row("acceleration", "m/s^2"));
+  }
+}
+
+}  // namespace
+
+void judge_runs(Backend& backend, const Fixture& fixture, const Judgement& oracle,
+                const CheckSelection& checks, Sheet& sheet) {
+  const auto wanted = [&](const char* name) { return checks.count(name) > 0; };
+  const bool runs = wanted("trajectory") || wanted("mass") || wanted("containment") ||
+                    wanted("determinism");
+  if (runs) {
+    const Run r = run(backend, fixture.scene, oracle.walls, fixture.state, oracle.stretches);
+    const bool whole = r.end.position.cols() == fixture.state.size() &&
+                       r.end.velocity.cols() == fixture.state.size();
+    for (const char* name : {"trajectory", "mass", "containment", "determinism"}) {
+      if (!wanted(name)) continue;
+      if (!r.status.ok()) {
+        sheet.failed(name, describe(r.status));
+      } else if (!whole) {
+        sheet.failed(name, fmt::format("{} positions and {} velocities, not {}",
+                                       r.end.position.cols(), r.end.velocity.cols(),
+                                       fixture.state.size()));
+      } else if (name == std::string("trajectory")) {
+        judge_trajectory(r, fixture, oracle, sheet);
+      } else if (name == std::string("mass")) {
+        judge_mass(r, fixture, oracle, sheet);
+      } else if (name == std::string("containment")) {
+        judge_containment(r, oracle, sheet);
+      } else {
+        judge_determinism(backend, fixture, oracle, r, sheet);
+      }
+    }
+  }
+  if (wanted("conservation")) judge_conservation(backend, fixture, oracle, sheet);
+  if (wanted("invariance")) judge_invariance(backend, oracle, sheet);
+}
+
+}  // namespace decant

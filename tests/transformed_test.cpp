@@ -1,0 +1,53 @@
+/// \file
+/// The same problem told otherwise has the same answer: the oracle itself must not care.
+#include "gpu/backends.hpp"
+#include "oracle/conform.hpp"
+#include "reference/error.hpp"
+#include "reference/sampling.hpp"
+
+#include <gtest/gtest.h>
+
+namespace decant {
+namespace {
+
+TEST(Transformed, ProblemsHaveTheAnswersOfTheProblem) {
+  const Fixture f = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-splash.h5");
+  const OracleAnswer own = answer(f.scene, sample_walls(f.scene), f.state);
+  const auto problems = transformed_problems(f.scene, f.state);
+  ASSERT_EQ(problems.size(), 3u);
+  for (const TransformedProblem& p : problems) {
+    const Walls walls = sample_walls(p.scene);
+    ASSERT_EQ(walls.size(), sample_walls(f.scene).size()) << p.name;
+    const OracleAnswer its = answer(p.scene, walls, p.state);
+    // Rounded to fp32 elsewhere, particles are elsewhere; walls sampled in a turned frame too.
+    const double allowed = p.name == "permuted" ? 1e-12 : p.name == "moved" ? 1e-3 : 0.02;
+    EXPECT_NEAR(its.fields.density.sum() / own.fields.density.sum(), 1, allowed) << p.name;
+    const double before = own.fields.acceleration.norm();
+    EXPECT_NEAR(its.fields.acceleration.norm() / before, 1, 10 * allowed) << p.name;
+  }
+  EXPECT_EQ(problems[2].scene.containers[0].tilt->axis.x(), -f.scene.containers[0].tilt->axis.y());
+}
+
+TEST(Checks, AreChosenByName) {
+  EXPECT_EQ(all_checks().size(), 8u);
+  EXPECT_EQ(parse_checks({"mass", "fields"}), (CheckSelection{"fields", "mass"}));
+  try {
+    parse_checks({"mas"});
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.key(), "--check");
+    EXPECT_NE(error.bound().find("containment"), std::string::npos);
+  }
+}
+
+TEST(Checks, AreMadeWhereTheyAreChosenAndNowhereElse) {
+  const Fixture f = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-rest.h5");
+  const Judgement oracle = prepare(f, {"conservation"});
+  EXPECT_TRUE(oracle.transformed.empty());
+  const auto backend = make_backend("hash", Executor::host, "");
+  for (const CheckRow& row : judge(*backend, f, oracle, {"conservation"}))
+    EXPECT_EQ(row.check, "conservation");
+}
+
+}  // namespace
+}  // namespace decant
