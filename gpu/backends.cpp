@@ -15,7 +15,6 @@ namespace {
 
 using gpu::DeviceSolver;
 
-/// A backend under test is one line here and its query in a file of its own.
 struct Entry {
   const char* name;
   std::unique_ptr<DeviceSolver> (*host)(const gpu::SolverOptions&);
@@ -23,16 +22,12 @@ struct Entry {
 };
 
 #if DECANT_HAS_CUDA
-#define DECANT_ENTRY(name) {#name, gpu::host::make_##name, gpu::cuda::make_##name}
+#define DECANT_ENTRY(name, Search) {#name, gpu::host::make_##name, gpu::cuda::make_##name},
 #else
-#define DECANT_ENTRY(name) {#name, gpu::host::make_##name, nullptr}
+#define DECANT_ENTRY(name, Search) {#name, gpu::host::make_##name, nullptr},
 #endif
 
-const Entry table[] = {
-    DECANT_ENTRY(brute),
-    DECANT_ENTRY(hash),
-    DECANT_ENTRY(list),
-};
+const Entry table[] = {DECANT_BACKENDS(DECANT_ENTRY)};
 
 using FloatRows = Eigen::Matrix<float, 3, Eigen::Dynamic>;
 
@@ -176,6 +171,12 @@ std::string executor_device(Executor executor) {
 
 std::string thrust_version() { return gpu::host::thrust_version(); }
 
+std::unique_ptr<Backend> backend_around(std::string name, Executor executor, std::string options,
+                                        std::unique_ptr<DeviceSolver> solver) {
+  return std::make_unique<DeviceBackend>(std::move(name), executor, std::move(options),
+                                         std::move(solver));
+}
+
 std::unique_ptr<Backend> make_backend(std::string_view name, Executor executor,
                                       const std::string& options) {
   for (const Entry& entry : table) {
@@ -185,7 +186,7 @@ std::unique_ptr<Backend> make_backend(std::string_view name, Executor executor,
     if (!executor_available(executor, &why_not))
       throw BackendError("executor cuda: " + why_not);
     const auto make = executor == Executor::host ? entry.host : entry.cuda;
-    return std::make_unique<DeviceBackend>(entry.name, executor, options, make(parsed));
+    return backend_around(entry.name, executor, options, make(parsed));
   }
   std::string known;
   for (const Entry& entry : table) known += (known.empty() ? "" : ", ") + std::string(entry.name);

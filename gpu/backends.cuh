@@ -8,14 +8,11 @@
 
 namespace decant::gpu::DECANT_EXECUTOR {
 
-std::unique_ptr<DeviceSolver> make_brute(const SolverOptions& options) {
-  return std::make_unique<Pipeline<BruteSearch>>(options);
-}
-std::unique_ptr<DeviceSolver> make_hash(const SolverOptions& options) {
-  return std::make_unique<Pipeline<HashSearch>>(options);
-}
-std::unique_ptr<DeviceSolver> make_list(const SolverOptions& options) {
-  return std::make_unique<Pipeline<ListSearch>>(options);
-}
+#define DECANT_MAKE(name, Search)                                                  \
+  std::unique_ptr<DeviceSolver> make_##name(const SolverOptions& options) {        \
+    return std::make_unique<Pipeline<Search>>(options);                            \
+  }
+DECANT_BACKENDS(DECANT_MAKE)
+#undef DECANT_MAKE
 
 }  // namespace decant::gpu::DECANT_EXECUTOR

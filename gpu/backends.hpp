@@ -11,6 +11,10 @@
 
 namespace decant {
 
+namespace gpu {
+class DeviceSolver;
+}
+
 enum class Executor { host, cuda };
 
 /// Names in the table: "brute", …
@@ -25,6 +29,10 @@ std::string executor_device(Executor executor);
 
 /// Of the host executor: "2.3.1".
 std::string thrust_version();
+
+/// The host side around any solver of an executor: for one that is not in the table.
+std::unique_ptr<Backend> backend_around(std::string name, Executor executor, std::string options,
+                                        std::unique_ptr<gpu::DeviceSolver> solver);
 
 /// Throws InputError for an unknown name or option, BackendError where the executor is missing.
 std::unique_ptr<Backend> make_backend(std::string_view name, Executor executor,

@@ -9,7 +9,7 @@
 /// with a hit are put off: threads then evaluate theirs together instead of waiting for each other.
 #pragma once
 
-#include "gpu/pipeline.cuh"
+#include "gpu/plain_search.cuh"
 
 namespace decant::gpu::DECANT_EXECUTOR {
 
@@ -21,6 +21,15 @@ struct BruteQuery {
   const float4* with_pressure;  // Arrays::point
   const float4* with_volume;    // Arrays::motion
   const WallSegment* segments;
+
+  static constexpr bool points_carry_square = true;
+  static BruteQuery of(const Constants& c, const Arrays& a, int all_end, const WallSegment* segments) {
+    return {c, a.base, all_end, a.now.position, a.point, a.motion, segments};
+  }
+  template <class Pass>
+  static void run(Queue& queue, int n, const Pass& pass) {
+    queue.for_each_tile_team(n, pass);
+  }
 
   template <class Team, class Visit>
   DECANT_DEVICE void each(Team& team, const Float3 (&x)[Team::held], const float4*,
@@ -105,71 +114,6 @@ struct BruteQuery {
   }
 };
 
-/// For Pipeline: nothing is built, the arrays are enough.
-class BruteSearch {
- public:
-  explicit BruteSearch(const SolverOptions&) {}
-
-  static constexpr bool points_carry_square = true;
-
-  void load(Queue& queue, const Constants& c, const Arrays& a, const WallStore& walls,
-            const std::vector<float>&) {
-    c_ = c;
-    walls_ = walls;
-    end_ = a.base + walls.padded_total();
-    queue.for_each(walls.padded_total(), UnposedPass{a, walls.walls});
-    segments_.upload(walls.segments);
-    for (std::size_t k = 0; k < walls.segments.size(); ++k)
-      with_periodic(c_, [&](auto periodic) {
-        using Query = BruteQuery<decltype(periodic)::value>;
-        const WallSegment& s = walls.segments[k];
-        queue.for_each_tile_team(s.end - s.begin,
-                                 VolumePass<Query>{c_, a, query<Query>(a), walls.walls,
-                                                   static_cast<int>(k), s.begin});
-      });
-  }
-  void arrange(Arrays& a, const Particles& state, const Particles&) const {
-    a.now = state;
-    a.next = state;
-  }
-  void begin(Queue&, const Arrays&) {}
-  bool capturable() const { return false; }
-
-  template <bool periodic, bool facts>
-  void density(Queue& queue, const Arrays& a, const DeviceGeometry&, const FieldArrays& out,
-               const Laps& laps) {
-    using Query = BruteQuery<periodic>;
-    queue.for_each(1, CountUp{&a.mailbox->substep});
-    laps.build();
-    queue.for_each_tile_team(
-        a.n, DensityPass<Query, facts>{c_, a, query<Query>(a), out, walls_.walls.id});
-    laps.density();
-  }
-  template <bool periodic, bool facts>
-  void force(Queue& queue, const Arrays& a, const FieldArrays& out, const Laps& laps) {
-    using Query = BruteQuery<periodic>;
-    queue.for_each_tile_team(a.n, ForcePass<Query, facts>{c_, a, query<Query>(a), out});
-    laps.force();
-  }
-  template <bool periodic>
-  void move(Queue& queue, const Arrays& a, const DeviceGeometry& geometry, const Laps& laps) {
-    queue.for_each(a.n + walls_.moving_count(),
-                   IntegratePass<Nothing>{c_, a, geometry, walls_.moving(a), {}});
-    laps.integrate();
-  }
-  bool grow(int) { return false; }
-  std::size_t bytes() const { return segments_.bytes(); }
-
- private:
-  template <class Query>
-  Query query(const Arrays& a) const {
-    return {c_, a.base, end_, a.now.position, a.point, a.motion, segments_.get()};
-  }
-
-  Constants c_{};
-  WallStore walls_{};
-  Buffer<WallSegment> segments_;
-  int end_ = 0;
-};
+using BruteSearch = PlainSearch<BruteQuery>;
 
 }  // namespace decant::gpu::DECANT_EXECUTOR

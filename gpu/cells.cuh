@@ -53,6 +53,8 @@ struct CellTable {
     if (spill <= 0) return {start[at + first], start[at + first + 5], 0, 0};
     return {start[at + first], start[at + wrap[0]], start[at], start[at + spill]};
   }
+  /// Cells that a reach spans along an axis, beyond the one it begins in.
+  DECANT_BOTH static int beyond(int axis) { return axis == 0 ? 2 : 1; }
   /// Whether a bucket is a cell's, and no padding of the table's.
   DECANT_BOTH bool in_table(int bucket) const {
     const Cell c = cell_of(bucket);
@@ -60,12 +62,12 @@ struct CellTable {
   }
 
   /// Distance² of a point from a bucket's cell, where the cells of all things lie side by side in the
-  /// table, `used` cells an axis from the origin on; what is within reach of them is at most three cells
-  /// beyond, so cells farther on are before the origin.
+  /// table, `used` cells an axis from the origin on; what is within reach of them is few cells beyond, so
+  /// cells farther on are before the origin.
   DECANT_DEVICE float distance2(int bucket, const int used[3], Float3 x) const {
     const Cell c = cell_of(bucket);
     const auto off = [&](int axis, int at, float to) {
-      const int cell = at > used[axis] + 3 ? at - wrap[axis] : at;
+      const int cell = at >= used[axis] + beyond(axis) ? at - wrap[axis] : at;
       const double low = origin[axis] + cell / inverse_cell[axis];
       const double high = origin[axis] + (cell + 1) / inverse_cell[axis];
       return to < low ? low - to : to > high ? to - high : 0.0;

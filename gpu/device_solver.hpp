@@ -52,20 +52,26 @@ class DeviceSolver {
   virtual std::size_t device_bytes() const = 0;
 };
 
+/// The table of backends under test: name on the command line, its search. A new backend is a line here
+/// and a file with its search, which backends.cuh includes.
+#define DECANT_BACKENDS(entry) \
+  entry(brute, BruteSearch)    \
+  entry(hash, HashSearch)      \
+  entry(list, ListSearch)
+
 /// Factories of one executor, and what it runs on.
+#define DECANT_DECLARE(name, Search) \
+  std::unique_ptr<DeviceSolver> make_##name(const SolverOptions& options);
 namespace host {
-std::unique_ptr<DeviceSolver> make_brute(const SolverOptions& options);
-std::unique_ptr<DeviceSolver> make_hash(const SolverOptions& options);
-std::unique_ptr<DeviceSolver> make_list(const SolverOptions& options);
+DECANT_BACKENDS(DECANT_DECLARE)
 std::string device();
 std::string thrust_version();
 }  // namespace host
 namespace cuda {
-std::unique_ptr<DeviceSolver> make_brute(const SolverOptions& options);
-std::unique_ptr<DeviceSolver> make_hash(const SolverOptions& options);
-std::unique_ptr<DeviceSolver> make_list(const SolverOptions& options);
+DECANT_BACKENDS(DECANT_DECLARE)
 /// Empty where no device can be used; `why_not` says why.
 std::string device(std::string* why_not);
 }  // namespace cuda
+#undef DECANT_DECLARE
 
 }  // namespace decant::gpu

@@ -230,9 +230,9 @@ class GridSearch {
       bool side_by_side = !c_.any_periodic;
       for (int axis = 0; axis < 3; ++axis) {
         const double cells = (high[axis] - s.table.origin[axis]) * s.table.inverse_cell[axis];
-        side_by_side = side_by_side && cells >= 0 && low[axis] >= s.table.origin[axis] &&
-                       cells + 9 < s.table.wrap[axis];
         pass.used[axis] = static_cast<int>(cells) + 1;
+        side_by_side = side_by_side && cells >= 0 && low[axis] >= s.table.origin[axis] &&
+                       pass.used[axis] + 2 * CellTable::beyond(axis) < s.table.wrap[axis];
       }
       if (!side_by_side) pass.used[0] = 0;
       queue.fill_zero(count.get(), count.bytes());

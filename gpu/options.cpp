@@ -60,7 +60,6 @@ const std::map<std::string, std::map<std::string, Setter>>& known_options() {
     o.graphs = one_of<bool>("graphs", v, {{"on", true}, {"off", false}});
   };
   static const std::map<std::string, std::map<std::string, Setter>> known = {
-      {"brute", {}},
       {"hash",
        {{"grid",
          [](O& o, const std::string& v) {
@@ -114,7 +113,9 @@ const std::map<std::string, std::map<std::string, Setter>>& known_options() {
 
 SolverOptions parse_options(const std::string& backend, const std::string& text) {
   SolverOptions options;
-  const auto& keys = known_options().at(backend);
+  static const std::map<std::string, Setter> none;
+  const auto entry = known_options().find(backend);
+  const auto& keys = entry == known_options().end() ? none : entry->second;
   std::set<std::string> seen;
   for (std::size_t at = 0; at < text.size();) {
     const auto end = std::min(text.find(':', at), text.size());

@@ -1,5 +1,5 @@
 # Decides whether the cuda executor is built, for which GPUs, and which Thrust the host executor
-# uses. Sets DECANT_HAS_CUDA (0 or 1) and DECANT_THRUST_INCLUDE_DIR.
+# uses. Sets DECANT_HAS_CUDA (0 or 1), DECANT_CUDA_FLAGS and DECANT_THRUST_INCLUDE_DIR.
 
 set(DECANT_HAS_CUDA 0)
 
@@ -48,6 +48,8 @@ if(DECANT_HAS_CUDA)
     set(CMAKE_CUDA20_EXTENSION_COMPILE_OPTION -std=c++20)
   endif()
   set(CMAKE_CUDA_RUNTIME_LIBRARY Static)
+  set(DECANT_CUDA_FLAGS --expt-relaxed-constexpr --extended-lambda --threads 0 --ftz=true
+    --prec-div=false --prec-sqrt=false)
   # One binary must not mix two versions of Thrust, so the host executor takes the toolkit's.
   find_path(DECANT_THRUST_INCLUDE_DIR thrust/version.h NO_DEFAULT_PATH
     HINTS ${CMAKE_CUDA_TOOLKIT_INCLUDE_DIRECTORIES} PATH_SUFFIXES cccl .)
