@@ -80,27 +80,33 @@ ParticleState run_oracle(const Scene& scene, const Walls& walls, const ParticleS
   return solver.state();
 }
 
+ParticleState run_disturbed(const Scene& scene, const Walls& walls, const ParticleState& start,
+                            std::int64_t substeps, std::uint32_t seed) {
+  Disturbance disturbance(seed);
+  Scene its_scene = scene;
+  disturbance.of(its_scene);
+  Solver solver(its_scene, walls, start);
+  ParticleState state = start;
+  for (std::int64_t k = 0; k < substeps; ++k) {
+    disturbance.of(state);
+    solver.restart(state);
+    solver.substep();
+    state = solver.state();
+  }
+  return state;
+}
+
 Ensemble run_ensemble(const Scene& scene, const Walls& walls, const ParticleState& start,
                       std::int64_t substeps, std::int64_t members, std::uint32_t seed) {
   const ParticleState undisturbed = run_oracle(scene, walls, start, substeps);
   Ensemble e;
   e.substeps = substeps;
   e.members = members;
-  Disturbance disturbance(seed);
   std::vector<Divergence> all;
-  for (std::int64_t m = 0; m < members; ++m) {
-    Scene its_scene = scene;
-    disturbance.of(its_scene);
-    Solver solver(its_scene, walls, start);
-    ParticleState state = start;
-    for (std::int64_t k = 0; k < substeps; ++k) {
-      disturbance.of(state);
-      solver.restart(state);
-      solver.substep();
-      state = solver.state();
-    }
-    all.push_back(divergence(scene, state, undisturbed));
-  }
+  for (std::int64_t m = 0; m < members; ++m)
+    all.push_back(divergence(
+        scene, run_disturbed(scene, walls, start, substeps, seed + static_cast<std::uint32_t>(m)),
+        undisturbed));
   const auto count = static_cast<double>(members);
   for (std::size_t k = 0; k < e.mean.size(); ++k) {
     for (const auto& d : all) e.mean[k] += d[k] / count;

@@ -28,9 +28,13 @@ struct Ensemble {
   Divergence mean{}, deviation{};
 };
 
-/// Runs it, sequentially. Before every substep x_c and v_c of every particle are multiplied by 1 + u r,
-/// u = 2⁻²⁴, r uniform in [−1, 1], and rounded to fp32, as a backend stores them. So is, once for a
-/// member, every constant that fp32 rounds once for all: mass, sound speed, viscosities, gravity, dt.
+/// The oracle's state `substeps` on, disturbed. Before every substep x_c and v_c of every particle are
+/// multiplied by 1 + u r, u = 2⁻²⁴, r uniform in [−1, 1], and rounded to fp32, as a backend stores them.
+/// So is, once, every constant that fp32 rounds once for all: mass, sound speed, viscosities, gravity, dt.
+ParticleState run_disturbed(const Scene& scene, const Walls& walls, const ParticleState& start,
+                            std::int64_t substeps, std::uint32_t seed);
+
+/// Runs it, sequentially, members seeded with seed, seed + 1, ….
 Ensemble run_ensemble(const Scene& scene, const Walls& walls, const ParticleState& start,
                       std::int64_t substeps, std::int64_t members, std::uint32_t seed = 1);
 

@@ -8,6 +8,7 @@
 #include "reference/pose.hpp"
 #include "reference/solver.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace decant {
@@ -269,6 +270,17 @@ class Bounds {
     }
   }
 
+  /// Whether every r² up to H² is exact in fp32: coordinates and H are whole multiples of some power of
+  /// two, 2^-11 of H at least. Then nothing about fluid neighbors is ambiguous, r = H included.
+  bool exact_distances() const {
+    const double H = scene_.support_radius(), grid = std::exp2(std::floor(std::log2(H)) - 10);
+    const auto whole = [&](double x) { return std::remainder(x, grid) == 0; };
+    const auto& x = state_.position;
+    return whole(H) && !(scene_.domain.periodic[0] || scene_.domain.periodic[1] ||
+                         scene_.domain.periodic[2]) &&
+           std::all_of(x.data(), x.data() + x.size(), whole);
+  }
+
   /// Pairs within 8 u X of H, X the largest magnitude the distance passes through.
   void ambiguous_pairs() {
     const double H = scene_.support_radius();
@@ -283,12 +295,13 @@ class Bounds {
     answer_.wall_ambiguous.assign(n, false);
     // A shell of half-width d about H holds 6 d/H of the pairs inside H where the fluid is uniform.
     double expected_fluid = 0, expected_wall = 0;
+    const bool exact = exact_distances();
     for (std::size_t i = 0; i < n; ++i) {
       const Vec3 x_i = state_.position.col(static_cast<Eigen::Index>(i));
       for (const auto j : near.fluid[i]) {
         const Vec3 x_j = state_.position.col(j), x_ij = separation_(x_i, x_j);
         const double margin = 8 * u * std::max(H, image_magnitude(x_i, x_j, x_ij));
-        if (std::abs(x_ij.norm() - H) <= margin) answer_.fluid_ambiguous[i] = true;
+        if (!exact && std::abs(x_ij.norm() - H) <= margin) answer_.fluid_ambiguous[i] = true;
         expected_fluid += 6 * margin / H;
       }
       for (const auto b : near.wall[i]) {
