@@ -2,10 +2,10 @@
 /// Looks for recordings beside the binary, so that the command works from any folder.
 #include "tools/fixture_folder.hpp"
 
+#include "oracle/hdf5_io.hpp"
 #include "reference/error.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <cstdlib>
 
 namespace decant {
@@ -13,10 +13,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// Study-scale recordings hold a sample of the oracle's answer. What cannot be read counts as small, so
+/// that somebody is told.
 bool is_small(const fs::path& file) {
-  const std::string name = file.filename().string();
-  const auto at = name.find("4k");  // of 4,000 particles, not of 64,000
-  return at != std::string::npos && (at == 0 || !std::isdigit(static_cast<unsigned char>(name[at - 1])));
+  try {
+    return !Hdf5Reader(file).has("/sample");
+  } catch (const InputError&) {
+    return true;
+  }
 }
 
 std::vector<fs::path> recordings(const fs::path& folder) {
@@ -57,7 +61,7 @@ std::vector<fs::path> fixtures_in(const fs::path& folder, bool all) {
   if (!all) std::erase_if(files, [](const fs::path& file) { return !is_small(file); });
   if (files.empty())
     throw InputError(folder.string(), "recordings", "none",
-                     all ? "at least one *.h5" : "at least one *4k*.h5");
+                     all ? "at least one *.h5" : "at least one small one");
   return files;
 }
 

@@ -12,7 +12,7 @@ namespace decant {
 /// where there is none.
 std::filesystem::path fixture_folder();
 
-/// The recordings in a folder, by name: those with "4k" in theirs, or all. Throws InputError where
+/// The recordings in a folder, by name: those that are not of study scale, or all. Throws InputError where
 /// there is none.
 std::vector<std::filesystem::path> fixtures_in(const std::filesystem::path& folder, bool all);
 

@@ -75,10 +75,27 @@ ParticleState state_in_frames(const Hdf5Reader& frames, const Scene& scene,
   return state;
 }
 
+/// Anybody's state: /position and /velocity, [N,3], at the substep of the root's attribute, or 0.
+ParticleState plain_state(const Hdf5Reader& reader) {
+  ParticleState state;
+  state.position = reader.matrix3("/position");
+  state.velocity = reader.matrix3("/velocity", state.position.cols());
+  if (reader.has_attribute("/", "substep")) state.substep = reader.integer_attribute("/", "substep");
+  if (state.substep < 0)
+    throw InputError(reader.file().string(), "substep", std::to_string(state.substep), ">= 0");
+  if (!state.position.allFinite() || !state.velocity.allFinite())
+    throw InputError(reader.file().string(), "/position and /velocity", "not finite",
+                     "finite numbers");
+  return state;
+}
+
 Start start_of(const RecordArguments& arguments, const Scene& scene) {
   if (arguments.from.empty()) return {initial_state(scene), {}, "the scene's initial state", {}};
   const std::string& file = arguments.from;
   const Hdf5Reader reader(file);
+  if (reader.has("/position"))
+    return {plain_state(reader), {},
+            std::filesystem::path(file).filename().string() + " " + sha256_of_file(file), {}};
   if (reader.has("/fluid/position")) {
     const auto name = [&](const char* attribute) { return reader.text_attribute("/", attribute); };
     return {state_in_frames(reader, scene, arguments.phases), {},
@@ -219,7 +236,8 @@ void add_record_command(CLI::App& app, int& exit_status) {
       ->required();
   verb->add_option("--phase", arguments->phases, "NAME or NAME=TIME (s); may be repeated")
       ->allow_extra_args(false);
-  verb->add_option("--from", arguments->from, "start from a frames.h5, a checkpoint.h5 or a fixture");
+  verb->add_option("--from", arguments->from, "start from a frames.h5, a checkpoint.h5, a fixture, or any HDF5 file with\n"
+                   "/position and /velocity, [N,3]");
   verb->add_option("--backend", arguments->backend, "what moves the fluid: reference, brute, …")
       ->capture_default_str();
   verb->add_option("--executor", arguments->executor, "auto, cuda or host")->capture_default_str();
