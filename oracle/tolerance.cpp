@@ -103,10 +103,10 @@ class Bounds {
                         &a.tolerance.wall_neighbor_count, &a.tolerance.wall_neighbor_id_sum})
       facts->setZero();
     a.tolerance.boundary_volume = volume_tolerances(scene, walls, volumes);
+    ambiguous_pairs();
     density_and_pressure();
     wall_velocity_error(walls);
     accelerations();
-    ambiguous_pairs();
   }
 
   OracleAnswer take() { return std::move(answer_); }
@@ -145,10 +145,15 @@ class Bounds {
         pose += rho0 * V[b] * slope * std::max(X_[b], image_magnitude(x_i, x_b, x_ib));
         from_volumes += rho0 * answer_.tolerance.boundary_volume[b] * W;
       }
+      // A pair that fp32 may place inside H has a term no larger than that of its nearest place.
+      double from_edge = 0;
+      for (const Edge& e : edge_fluid_[static_cast<std::size_t>(i)]) from_edge += m * kernel_.W(e.r);
+      for (const Edge& e : edge_wall_[static_cast<std::size_t>(i)])
+        from_edge += rho0 * V[e.id] * kernel_.W(e.r);
       C.density[i] = sum;
       C.density_pose[i] = pose;
       answer_.tolerance.density[i] =
-          growth(fluid.size() + wall.size() + 1, 6) * (sum + pose) + from_volumes;
+          growth(fluid.size() + wall.size() + 1, 6) * (sum + pose) + from_volumes + from_edge;
 
       // Pressure follows from the backend's own density unless density is given.
       const bool rho_given = given_ && given_->density.size();
@@ -244,6 +249,13 @@ class Bounds {
       viscous.pose += D * dL * std::sqrt(3.0) * image * dv;
       viscous.inputs += D * L * (relative_density_error(i) + relative_density_error(j)) * dv;
     }
+    for (const Edge& e : edge_fluid_[static_cast<std::size_t>(i)]) {
+      const Eigen::Index j = e.id;
+      pressure.inputs += m * std::abs(q_of(i) + q_of(j)) * kernel_.G(e.r) *
+                         separation_(x_i, Vec3(state_.position.col(j))).cwiseAbs();
+      viscous.inputs += mu / density_of(i) * m / density_of(j) * kernel_.L(e.r) *
+                        (state_.velocity.col(j) - v_i).cwiseAbs();
+    }
   }
 
   void wall_bounds(Eigen::Index i, const std::vector<std::int32_t>& ids, ForceBounds& pressure,
@@ -268,6 +280,12 @@ class Bounds {
       viscous.pose += D * (dL * std::sqrt(3.0) * X * dv + Vec3::Constant(L * wall_velocity_error_[b]));
       viscous.inputs += D * L * (relative_density_error(i) + tau_V / V[b]) * dv;
     }
+    for (const Edge& e : edge_wall_[static_cast<std::size_t>(i)]) {
+      pressure.inputs += rho0 * V[e.id] * std::abs(q_of(i)) * kernel_.G(e.r) *
+                         separation_(x_i, Vec3(posed_.position.col(e.id))).cwiseAbs();
+      viscous.inputs += mu_w / density_of(i) * V[e.id] * kernel_.L(e.r) *
+                        (posed_.velocity.col(e.id) - v_i).cwiseAbs();
+    }
   }
 
   /// Whether every r² up to H² is exact in fp32: coordinates and H are whole multiples of some power of
@@ -281,7 +299,8 @@ class Bounds {
            std::all_of(x.data(), x.data() + x.size(), whole);
   }
 
-  /// Pairs within 8 u X of H, X the largest magnitude the distance passes through.
+  /// Pairs within 8 u X of H, X the largest magnitude the distance passes through; those beyond H have no
+  /// term in the oracle's sums, but may have one in fp32.
   void ambiguous_pairs() {
     const double H = scene_.support_radius();
     const double widest = std::max({H, X_.size() ? X_.maxCoeff() : 0.0,
@@ -291,6 +310,8 @@ class Bounds {
     Neighbors near;
     find_neighbors(wider, state_.position, posed_.position, NeighborSearch::cells, near);
     const auto n = static_cast<std::size_t>(state_.size());
+    edge_fluid_.resize(n);
+    edge_wall_.resize(n);
     answer_.fluid_ambiguous.assign(n, false);
     answer_.wall_ambiguous.assign(n, false);
     // A shell of half-width d about H holds 6 d/H of the pairs inside H where the fluid is uniform.
@@ -301,13 +322,21 @@ class Bounds {
       for (const auto j : near.fluid[i]) {
         const Vec3 x_j = state_.position.col(j), x_ij = separation_(x_i, x_j);
         const double margin = 8 * u * std::max(H, image_magnitude(x_i, x_j, x_ij));
-        if (!exact && std::abs(x_ij.norm() - H) <= margin) answer_.fluid_ambiguous[i] = true;
+        const double r = x_ij.norm();
+        if (!exact && std::abs(r - H) <= margin) {
+          answer_.fluid_ambiguous[i] = true;
+          if (r >= H) edge_fluid_[i].push_back({j, H - margin});
+        }
         expected_fluid += 6 * margin / H;
       }
       for (const auto b : near.wall[i]) {
         const Vec3 x_b = posed_.position.col(b), x_ib = separation_(x_i, x_b);
         const double margin = 8 * u * std::max({H, X_[b], image_magnitude(x_i, x_b, x_ib)});
-        if (std::abs(x_ib.norm() - H) <= margin) answer_.wall_ambiguous[i] = true;
+        const double r = x_ib.norm();
+        if (std::abs(r - H) <= margin) {
+          answer_.wall_ambiguous[i] = true;
+          if (r >= H) edge_wall_[i].push_back({b, H - margin});
+        }
         expected_wall += 6 * margin / H;
       }
     }
@@ -323,6 +352,12 @@ class Bounds {
   PosedWalls posed_;
   Eigen::VectorXd X_, tau_q_, wall_velocity_error_;
   Neighbors near_;
+  /// A pair at H or just beyond, and the least distance that fp32 may find.
+  struct Edge {
+    std::int32_t id;
+    double r;
+  };
+  std::vector<std::vector<Edge>> edge_fluid_, edge_wall_;
   OracleAnswer answer_;
 };
 

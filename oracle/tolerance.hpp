@@ -45,6 +45,9 @@ struct OracleAnswer {
 ///             Σ rho0 V_b G x_c| + Σ (tau_rho,i/rho_i + tau_rho,j/rho_j)|t_visc| + Σ tau(V_b)/V_b |t|
 ///             + 3 u (|g| + |a|)
 ///
+/// A pair that the oracle has at H or beyond and fp32 may have inside adds its term at H − 8 u X, the
+/// nearest place that fp32 may find, to each of them.
+///
 /// With `given`, density and pressure are inputs, exact to both sides: their tolerances vanish from
 /// what follows.
 OracleAnswer answer(const Scene& scene, const Walls& walls, const ParticleState& state,
