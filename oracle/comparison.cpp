@@ -89,12 +89,12 @@ void compare(double error, double tolerance, CheckRow& row, std::int64_t worst_i
   if (row.verdict == Verdict::fail) row.reason = "beyond tolerance";
 }
 
-Sheet::Sheet(const BackendInfo& info, const Fixture& fixture) {
+Sheet::Sheet(const BackendInfo& info, const std::string& fixture) {
   common_.backend = info.name;
   common_.options = info.options;
   common_.executor = info.executor;
   common_.device = info.device;
-  common_.fixture = fixture.name;
+  common_.fixture = fixture;
 }
 
 CheckRow& Sheet::row(const char* check, const std::string& field, const char* unit) {

@@ -46,7 +46,7 @@ void compare(double error, double tolerance, CheckRow& row, std::int64_t worst_i
 /// Rows of one backend on one fixture, in order.
 class Sheet {
  public:
-  Sheet(const BackendInfo& info, const Fixture& fixture);
+  Sheet(const BackendInfo& info, const std::string& fixture);
 
   CheckRow& row(const char* check, const std::string& field, const char* unit);
   /// A check of which nothing could be compared.

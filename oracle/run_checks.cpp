@@ -3,6 +3,7 @@
 #include "oracle/run_checks.hpp"
 
 #include "oracle/audit.hpp"
+#include "oracle/field_checks.hpp"
 
 #include <fmt/format.h>
 
@@ -157,22 +158,9 @@ void judge_conservation(Backend& backend, const Fixture& fixture, const Judgemen
   Fields got = Fields::unwritten(n, m);
   if (const Status status = backend.evaluate(got, &oracle.inputs); !status.ok())
     return sheet.failed("conservation", describe(status));
-  const auto momentum = [&](const char* name, Eigen::Matrix3Xd Fields::*field) {
-    Values v;
-    const double mass = fixture.scene.particle_mass();
-    v.got = mass * (got.*field).rowwise().sum();
-    v.expected = mass * (oracle.given.fields.*field).rowwise().sum();
-    v.tolerance = mass * (oracle.given.tolerance.*field).rowwise().norm();
-    v.float_value = mass * (oracle.given_float.*field).rowwise().sum();
-    v.components = 3;
-    CheckRow& row = sheet.row("conservation", name, "N");
-    compare(v, row);
-    row.worst_id = -1;
-  };
   if (got.pressure_acceleration.cols() != n || got.viscous_acceleration.cols() != n)
     return sheet.failed("conservation", "accelerations of another number of particles");
-  momentum("pressure_momentum", &Fields::pressure_acceleration);
-  momentum("viscous_momentum", &Fields::viscous_acceleration);
+  judge_momentum(got, all_answered(), fixture, oracle, sheet);
 }
 
 void judge_determinism(Backend& backend, const Fixture& fixture, const Judgement& oracle,

@@ -1,0 +1,82 @@
+/// \file
+/// The checks `fields`, `substep` and `conservation` of values that are already there, whoever
+/// computed them: a backend that was run, or a file.
+#pragma once
+
+#include "oracle/comparison.hpp"
+#include "oracle/conform.hpp"
+
+#include <set>
+#include <string>
+
+namespace decant {
+
+struct AccelerationField {
+  const char* name;
+  Eigen::Matrix3Xd Fields::*member;
+};
+/// The four parts, and their sum with gravity.
+inline constexpr AccelerationField acceleration_fields[] = {
+    {"pressure_acceleration", &Fields::pressure_acceleration},
+    {"viscous_acceleration", &Fields::viscous_acceleration},
+    {"wall_pressure_acceleration", &Fields::wall_pressure_acceleration},
+    {"wall_viscous_acceleration", &Fields::wall_viscous_acceleration},
+    {"acceleration", &Fields::acceleration},
+};
+
+struct NeighborFact {
+  const char* name;
+  IdVector Fields::*member;
+  bool of_walls;
+};
+inline constexpr NeighborFact neighbor_facts[] = {
+    {"fluid_neighbor_count", &Fields::fluid_neighbor_count, false},
+    {"fluid_neighbor_id_sum", &Fields::fluid_neighbor_id_sum, false},
+    {"wall_neighbor_count", &Fields::wall_neighbor_count, true},
+    {"wall_neighbor_id_sum", &Fields::wall_neighbor_id_sum, true},
+};
+
+struct StageField {
+  const char* name;
+  Eigen::VectorXd Fields::*member;
+  const char* unit;
+};
+inline constexpr StageField stage_fields[] = {
+    {"boundary_volume", &Fields::boundary_volume, "m^3"},
+    {"density", &Fields::density, "kg/m^3"},
+    {"pressure", &Fields::pressure, "Pa"},
+};
+
+/// Which fields somebody answered, by the names above, and "position", "velocity". A field that was
+/// not answered gets a row all the same, not_run.
+using Answered = std::set<std::string>;
+
+/// What a backend that was run has answered: everything.
+const Answered& all_answered();
+
+/// Reason of a row that nobody answered.
+inline constexpr const char* not_given = "not given";
+
+/// Rows `neighbors`, `boundary_volume`, `density`, `pressure`, each from the stage before.
+void judge_stages(const Fields& got, const Answered& answered, const Judgement& oracle,
+                  Sheet& sheet);
+
+/// Row `acceleration`: accelerations from the oracle's own density and pressure.
+void judge_staged(const Fields& got, const Answered& answered, const Judgement& oracle,
+                  Sheet& sheet);
+
+/// Row `evaluation`: accelerations from one's own density and pressure.
+void judge_evaluation(const Fields& got, const Answered& answered, const Judgement& oracle,
+                      Sheet& sheet);
+
+/// Row `substep`. Position and velocity, as far as answered, are held together to the outcome that
+/// they are nearest to.
+/// \param got  one substep after the fixture's state, in id order
+void judge_substep(const ParticleState& got, const Answered& answered, const Fixture& fixture,
+                   const Judgement& oracle, Sheet& sheet);
+
+/// Row `conservation`: what the parts of `judge_staged` that act between fluid particles add up to.
+void judge_momentum(const Fields& got, const Answered& answered, const Fixture& fixture,
+                    const Judgement& oracle, Sheet& sheet);
+
+}  // namespace decant
