@@ -1,0 +1,259 @@
+"""Wrong backends, made from the real ones: each entry changes one place of gpu/ and names the check
+that must fail for it. plant.py puts them all into one build, where a number chooses among them.
+
+`find` stands once in `file`. `put` takes its place when the fault is on: an expression, in which $
+stands for what was found, or, where it says ON, text that asks for itself whether the fault is on.
+`on` is "cuda" for what exists on a GPU only; such a fault is not run on the host.
+"""
+
+FAULTS = []
+
+
+def fault(name, what, file, find, put, check, backend="hash", field="", fixture="pour-4k-stream",
+          on="both", also=()):
+    FAULTS.append(dict(name=name, what=what, changes=[(file, find, put), *also], check=check,
+                       field=field, backend=backend, fixture=fixture, on=on))
+
+
+# Formulas.
+fault("kernel-constant", "W's constant wrong by 2e-6", "physics.cuh",
+      "return c.w_norm * (q < 1.0f ? 1.0f - q * q * (1.5f - 0.75f * q) : outer);",
+      "return (ON ? 1.000002f : 1.0f) * c.w_norm * (q < 1.0f ? 1.0f - q * q * (1.5f - 0.75f * q) : "
+      "outer);", "density", "brute")
+fault("gradient-constant", "G's inner branch wrong by 1e-5", "physics.cuh",
+      "c.g_near[0] - c.g_near[1] * q", "1.00001f * $", "acceleration", field="pressure_acceleration")
+fault("gradient-outer", "G's outer branch wrong by 2e-5", "physics.cuh",
+      "c.g_far * d.inverse * (s * s)", "1.00002f * $", "acceleration", field="pressure_acceleration")
+fault("gradient-cut", "G is cut off at 0.99 H", "physics.cuh",
+      "const float s = positive(2.0f - q);\n    const float far",
+      "const float s = ON && q > 1.98f ? 0.0f : positive(2.0f - q);\n    const float far",
+      "acceleration", field="pressure_acceleration")
+fault("fast-root", "the square root by the bit trick, two steps of Newton's", "physics.cuh",
+      "#ifdef __CUDACC__\n  const float y = rsqrtf", """if (ON) {
+    int bits;
+    memcpy(&bits, &r2, sizeof bits);
+    bits = 0x5f3759df - (bits >> 1);
+    float guess;
+    memcpy(&guess, &bits, sizeof guess);
+    for (int k = 0; k < 2; ++k) guess = guess * (1.5f - 0.5f * r2 * guess * guess);
+    return {r2 * guess, guess};
+  }
+#ifdef __CUDACC__
+  const float y = rsqrtf""", "density")
+fault("eos-constant", "the equation of state subtracts 1.00001", "physics.cuh",
+      "(power - 1.0f)", "(power - 1.00001f)", "evaluation")
+fault("eos-exponent", "gamma is 6", "physics.cuh", "if (c.eos_exponent == 7) {",
+      "if (ON) {\n    power = s * s * s * s * s * s;\n  } else if (c.eos_exponent == 7) {", "pressure",
+      "brute")
+fault("tension", "negative pressures are kept", "physics.cuh",
+      "return c.allow_tension ||", "return ON || c.allow_tension ||", "pressure")
+fault("stiffness", "B wrong by 1 %", "physics.cuh", "const float p = c.stiffness *",
+      "const float p = (ON ? 1.01f : 1.0f) * c.stiffness *", "pressure")
+fault("mass", "particle mass wrong by 5e-6", "queries.cuh", "return j < base ? c.mass",
+      "return j < base ? (ON ? 1.000005f : 1.0f) * c.mass", "density")
+fault("no-self", "density without the particle itself", "passes.cuh",
+      "sum[k].density = own;", "sum[k].density = ON ? 0.0f : own;", "evaluation")
+fault("self-per-lane", "every lane counts the particle itself", "passes.cuh",
+      "team.leads() ? c.mass * kernel.w(c, {0.0f, 0.0f}) : 0.0f;",
+      "ON || team.leads() ? c.mass * kernel.w(c, {0.0f, 0.0f}) : 0.0f;", "density", on="cuda")
+fault("q-of-rest-density", "p/rho0² where p/rho² belongs", "passes.cuh",
+      "p / (density * density)", "p / (c.rest_density * c.rest_density)", "evaluation")
+fault("viscosity-of-rest-density", "viscosity with 1/rho0", "passes.cuh",
+      "1.0f / density);", "ON ? c.inverse_rest_density : 1.0f / density);", "evaluation",
+      field="viscous_acceleration")
+fault("viscosity", "viscosity wrong by 1e-5", "passes.cuh", "c.viscosity * c.mass",
+      "1.00001f * $", "acceleration", "brute", "viscous_acceleration")
+fault("wall-viscosity", "wall viscosity wrong by 1e-3", "passes.cuh",
+      "(wall ? c.wall_viscosity : fluid_viscosity)",
+      "(wall ? (ON ? 1.001f : 1.0f) * c.wall_viscosity : fluid_viscosity)", "acceleration",
+      field="wall_viscous_acceleration")
+fault("one-sided-pressure", "pairs pushed by p_i alone: momentum is not kept", "passes.cuh",
+      "(own[k].q + query.pressure_term(j, other))", "(own[k].q + own[k].q)", "conservation",
+      field="pressure_momentum")
+fault("mirrored-pressure", "walls have the particle's pressure on top", "passes.cuh",
+      "const Float3 push = (weight *", "const Float3 push = ((ON && wall ? 2.0f : 1.0f) * weight *",
+      "acceleration", field="wall_pressure_acceleration")
+fault("gravity", "gravity points up", "device_scene.cpp", "c.gravity = to_float3(scene.gravity);",
+      "c.gravity = to_float3(ON ? Vec3(-scene.gravity) : scene.gravity);", "acceleration")
+fault("wall-at-rest", "walls drag as if they stood still", "walls.cuh",
+      "cross(pose.omega, x - pose.pivot)", "Float3{0, 0, 0}", "acceleration",
+      field="wall_viscous_acceleration")
+
+fault("linear-ignored", "every equation of state has gamma 7", "device_scene.cpp",
+      "c.eos_exponent = static_cast<int>(fluid.eos_exponent);",
+      "c.eos_exponent = ON ? 7 : static_cast<int>(fluid.eos_exponent);",
+      "pressure", fixture="hostile-crowd")
+fault("closed-support", "pairs at exactly H are neighbors", "brute_force.cuh",
+      "if (r2 < c.H2) visit(k, j, d, r2);", "if (ON ? r2 <= c.H2 : r2 < c.H2) visit(k, j, d, r2);",
+      "neighbors", "brute", fixture="hostile-exact-support",
+      also=[("passes.cuh", "if (!(r2 < c.H2)) return;", "if (!(ON ? r2 <= c.H2 : r2 < c.H2)) return;")])
+fault("unguarded-root", "1/r of particles in one place", "physics.cuh",
+      "DECANT_DEVICE Radius radius(float r2) {\n",
+      "DECANT_DEVICE Radius radius(float r2) {\n  if (ON) return {sqrtf(r2), 1.0f / sqrtf(r2)};\n",
+      "evaluation", fixture="hostile-periodic")
+fault("one-sided-image", "periodic images are looked for on one side", "physics.cuh",
+      "d.x -= c.period[0] * rintf(d.x * c.inverse_period[0]);",
+      "d.x -= c.period[0] * (ON ? (d.x > 0.5f * c.period[0] ? 1.0f : 0.0f) : rintf(d.x * "
+      "c.inverse_period[0]));", "neighbors", fixture="hostile-periodic")
+fault("no-wrap", "particles that leave a periodic domain are not put back", "passes.cuh",
+      "if (!c.periodic[axis]) return x;", "if (ON || !c.periodic[axis]) return x;", "trajectory", "list",
+      fixture="hostile-periodic")
+fault("faces-forgotten", "every other face of a box does not hold", "contact.cuh",
+      "for (int k = 0; k < shape.faces; ++k) {", "for (int k = 0; k < shape.faces; k += ON ? 2 : 1) {",
+      "substep", fixture="hostile-crowd")
+fault("crowd-cut", "a particle has at most 64 neighbors", "collect.cuh",
+      "if (++shelf.count % 4 != 0) return;", "if (ON && shelf.count >= 64) return;\n    "
+      "if (++shelf.count % 4 != 0) return;", "neighbors", fixture="hostile-crowd")
+
+# Precision.
+fault("half-velocity", "neighbors' velocities stored with 11 bits", "passes.cuh",
+      "a.motion[i] = make_float4(v.x,", "a.motion[i] = make_float4(ON ? rounded_to(11, v.x) : v.x,",
+      "acceleration",
+      field="viscous_acceleration")
+fault("half-pressure", "neighbors' p/rho² stored with 11 bits", "queries.cuh",
+      "pressure_term(int, float4 other) const { return other.w; }",
+      "pressure_term(int, float4 other) const { return ON ? rounded_to(11, other.w) : other.w; }",
+      "acceleration", field="pressure_acceleration")
+fault("cancelling-distance", "r² as |x_i|² + |x_j|² − 2 x_i·x_j", "collect.cuh",
+      "if (dot(d, d) < shelf.reach2", "if ((ON ? dot(shelf.x, shelf.x) + dot(xyz(other), xyz(other)) - "
+      "2.0f * dot(shelf.x, xyz(other)) : dot(d, d)) < shelf.reach2",
+      "neighbors")
+fault("narrow-filter", "brute force's filter without room for rounding", "brute_force.cuh",
+      "16.0f * 0x1p-24f * (reach * reach)", "-0.5f * $", "neighbors", "brute")
+fault("rounded-density", "density rounded to 18 bits", "passes.cuh",
+      "const float density = team.sum(sum.density);",
+      "const float density = ON ? rounded_to(18, team.sum(sum.density)) : team.sum(sum.density);", "density")
+
+# Wall volumes.
+fault("volume-of-spacing", "wall particles have half their volume", "walls.cuh", "1.0f / total",
+      "0.5f / total", "boundary_volume")
+fault("volume-of-world", "wall volumes wrong by 2e-6", "walls.cuh",
+      "sum[k] += kernel.w(c, radius(r2));",
+      "sum[k] += (ON ? 1.000002f : 1.0f) * kernel.w(c, radius(r2));", "boundary_volume", "brute")
+
+# Search.
+fault("dropped-row", "one of nine rows of cells is not looked at", "queries.cuh",
+      "d < (by_rows ? 9 : 1)", "d < (by_rows ? (ON ? 8 : 9) : 1)", "neighbors")
+fault("range-off-by-one", "ranges of cells end one particle early", "queries.cuh",
+      "first + (part ? r.end2 : r.end)", "$ - 1", "neighbors", "hash:pairs=rescan")
+fault("near-walls-cut", "the table of near walls reaches to 0.9 H", "walls.cuh",
+      "1.0001f * reach2", "0.81f * reach2", "neighbors", field="wall_neighbor_count")
+fault("source-frame", "the tilted source is looked up untilted", "queries.cuh",
+      "if (!s->in_world) at =", "if (!s->in_world && !ON) at =", "neighbors",
+      field="wall_neighbor_count")
+fault("arrival-order", "the order in a cell is that of arrival", "sort.cuh",
+      "at[other].x < own.x", "other < t", "determinism",
+      on="cuda")
+fault("list-short-by-one", "each list's last entry is lost", "collect.cuh",
+      "lists.count_of(i, team.lane()) = shelf.count;",
+      "lists.count_of(i, team.lane()) = shelf.count - (ON && shelf.count % 4 == 1 ? 1 : 0);",
+      "neighbors", "list")
+fault("tail-word", "the last word of a list is not filled up", "collect.cuh",
+      "while (shelf.count % 4 != 0) put(shelf, lists.ghost);",
+      "while (!ON && shelf.count % 4 != 0) put(shelf, lists.ghost);", "neighbors")
+fault("list-cut", "lists end where there is no more room, and nobody says so", "collect.cuh",
+      "if (shelf.count > lists.capacity) atomic_maximum",
+      "if (!ON && shelf.count > lists.capacity) atomic_maximum", "neighbors", "hash:capacity=8")
+fault("self-neighbor", "a particle is its own neighbor", "collect.cuh", "&& j != shelf.i",
+      "&& (ON || j != shelf.i)", "neighbors", "list")
+fault("ids-exchanged", "two particles exchange their ids in sorting", "grid_sources.cuh",
+      "a.id[to] = id;", "a.id[to] = ON && (id == 100 || id == 101) ? 201 - id : id;", "acceleration")
+fault("velocity-left-behind", "sorting leaves velocities where they were", "grid_sources.cuh",
+      "into.velocity[to] = from.velocity[i];", "into.velocity[to] = from.velocity[ON ? to : i];",
+      "acceleration", field="viscous_acceleration")
+fault("thrust-unstable", "the sort by key forgets to bring the ids", "sort.cuh",
+      "source.place(index[t], id[index[t]], t, key[t]);",
+      "source.place(index[t], id[ON ? t : index[t]], t, key[t]);", "density", "hash:sort=thrust")
+
+# Lists that are kept.
+fault("stale-list", "lists are never built again", "trigger.cuh",
+      "if (stale) call();", "if (stale && !ON) call();", "trajectory", "list:skin=0.05",
+      fixture="pour-4k-splash")
+fault("stale-wall", "in a run the source stays where it was first", "walls.cuh",
+      "const DevicePose& pose = a.poses_at_end()[walls.container[slot]];",
+      "const DevicePose& pose = (ON ? a.poses : a.poses_at_end())[walls.container[slot]];",
+      "trajectory", "brute")
+fault("wall-a-substep-late", "in a run walls are placed one substep late", "walls.cuh",
+      "    place_wall(a, walls, slot, rotate(pose, xyz(walls.local[slot])) + pose.translation, id, pose);",
+      "    const DevicePose& late = (ON && a.mailbox->substep > 0 ? &pose - a.containers : &pose)[0];\n"
+      "    place_wall(a, walls, slot, rotate(late, xyz(walls.local[slot])) + late.translation, id, late);",
+      "trajectory", "list")
+
+# Integration and contact.
+fault("explicit-euler", "positions move by the old velocity", "passes.cuh",
+      "x = x + c.dt * v;", "x = x + c.dt * (ON ? xyz(a.motion[i]) : v);", "substep", "list")
+fault("other-gravity", "gravity wrong by 5e-5, in runs alone", "passes.cuh",
+      "total(team, s.pressure + s.viscous) + c.gravity",
+      "$ + 5e-5f * c.gravity", "substep", "list")
+fault("fast-reciprocal", "the viscous quotient by a reciprocal of 17 bits", "physics.cuh",
+      "DECANT_DEVICE float quotient(float a, float b) {",
+      "DECANT_DEVICE float quotient(float a, float b) {\n  if (ON) return a * rounded_to(17, 1.0f / b);",
+      "acceleration", field="viscous_acceleration")
+fault("no-walls-in-runs", "walls drag in evaluations alone", "passes.cuh",
+      "sum[k].viscous = sum[k].viscous + pull;",
+      "if (!(ON && !facts && wall)) sum[k].viscous = sum[k].viscous + pull;", "substep", "brute")
+fault("normal-in-wrong-frame", "the source's normal is not turned into the world", "contact.cuh",
+      "rotate(poses[k], near.normal)", "near.normal", "substep", "list")
+fault("contact-closer", "contact at 0.999 of its distance", "contact.cuh",
+      "c.contact_distance - gap", "0.999f * c.contact_distance - gap", "substep")
+fault("pulled-in", "contact pushes into the wall", "contact.cuh",
+      "c.contact_distance - gap", "gap - c.contact_distance", "containment", "list")
+fault("no-friction", "contact without friction", "contact.cuh", "1.0f - c.friction * impulse / slip",
+      "1.0f", "substep", "brute")
+fault("wall-velocity-in-contact", "contact with a wall that moves as if it did not", "contact.cuh",
+      "pose ? cross(pose->omega, x - pose->pivot)", "pose && !ON ? cross(pose->omega, x - pose->pivot)",
+      "substep")
+fault("one-projection", "where two walls meet only one pushes", "contact.cuh",
+      "projection < 2", "projection < (ON ? 1 : 2)", "substep", fixture="pour-4k-settled")
+fault("contact-at-the-start", "walls push from where they stood before the substep", "contact.cuh",
+      "const Float3 local = rotate_back(poses[k], x - poses[k].translation);",
+      "const DevicePose& then = poses[ON ? k - g.containers : k];\n"
+      "      const Float3 local = rotate_back(then, x - then.translation);", "substep")
+fault("no-floor", "the floor does not hold", "contact.cuh", "if (c.has_floor && x.z",
+      "if (!ON && c.has_floor && x.z", "substep", fixture="pour-4k-rest")
+fault("jumps-out", "in a run a particle leaves the domain at once", "passes.cuh",
+      "    a.next.position[i] = point_at(x);",
+      "    if (ON && a.id[i] == 77) x.x = 3.0f;\n    a.next.position[i] = point_at(x);", "mass", "brute")
+fault("copied-particle", "one particle is read as another one", "pipeline.cuh",
+      "velocity = by_id(state_.velocity.download(n), id);",
+      """velocity = by_id(state_.velocity.download(n), id);
+    for (std::size_t c = 0; c < 3 && ON; ++c) {
+      position[36 + c] = position[33 + c];
+      velocity[36 + c] = velocity[33 + c];
+    }""", "mass")
+
+# Output.
+fault("nan-lane", "every 32nd density is no number", "passes.cuh", "out.density[id] = density;",
+      "out.density[id] = ON && id % 32 == 7 ? NAN : density;", "density")
+fault("unwritten", "the last particle's pressure is not written", "passes.cuh",
+      "out.pressure[id] = p;", "if (!ON || id != a.n - 1) out.pressure[id] = p;", "pressure", "list")
+fault("read-in-cell-order", "the state is read in the order of the cells", "pipeline.cuh",
+      "const auto k = 3 * static_cast<std::size_t>(id[i]);",
+      "const auto k = 3 * (ON ? i : static_cast<std::size_t>(id[i]));", "substep")
+fault("axis-for-granted", "walls turn about y, whatever their axis", "walls.cuh",
+      "cross(pose.omega, x - pose.pivot)", "cross(Float3{0, pose.omega.y, 0}, x - pose.pivot)",
+      "invariance", "brute")
+
+# What only a GPU can do wrong.
+fault("missing-sync", "nobody waits until a tile has been read", "team.cuh",
+      "    }\n    __syncthreads();\n    return tile_;", "    }\n    if (!ON) __syncthreads();\n    return tile_;",
+      "density", "brute", on="cuda",
+      also=[("team.cuh", "    __syncthreads();\n#pragma unroll", "    if (!ON) __syncthreads();\n#pragma unroll")])
+fault("uninitialised-tile", "the end of every tile is not written", "team.cuh",
+      "for (int k = 0; k < tile_points; k += tile_size) {",
+      "for (int k = 0; k < tile_points - (ON ? tile_size : 0); k += tile_size) {", "neighbors", "brute",
+      on="cuda")
+fault("race-on-counter", "a cell's counter is counted up without an atomic", "sort.cuh",
+      "slot[i] = atomic_increment(count + bucket);",
+      "slot[i] = ON ? count[bucket]++ : atomic_increment(count + bucket);", "run", on="cuda")
+fault("dropped-tail-block", "the last, partly filled block is not launched", "queue.cuh",
+      "<<<(n + particles - 1) / particles, group_block, 0, stream_>>>(n, body);",
+      "<<<ON && n >= particles ? n / particles : (n + particles - 1) / particles, group_block, 0, "
+      "stream_>>>(n, body);", "evaluation", on="cuda")
+fault("dropped-tail-of-integration", "the last block of particles does not move", "queue.cuh",
+      "particle_kernel<<<(n + 255) / 256, 256, 0, stream_>>>(n, body);",
+      "particle_kernel<<<ON && n > 2000 ? n / 256 : (n + 255) / 256, 256, 0, stream_>>>(n, body);",
+      "acceleration", "brute", on="cuda")
+fault("half-the-lanes", "a sum over lanes stops one step early", "team.cuh",
+      "for (int step = lanes / 2; step > 0; step /= 2) value",
+      "for (int step = lanes / 2; step > (ON ? 1 : 0); step /= 2) value", "density", on="cuda")

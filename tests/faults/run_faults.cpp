@@ -1,0 +1,378 @@
+/// \file
+/// Judges every planted fault of an altered copy of gpu/ (plant.py) and says which checks caught it.
+/// Each runs in a process of its own, so that one that crashes or hangs is one more that was caught.
+/// Exit status: 0 every fault caught by the check that is there for it and the backends without a fault
+/// pass; 1 otherwise; 2 bad input.
+#include "gpu/backends.hpp"
+#include "gpu/fault.hpp"
+#include "oracle/conform.hpp"
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <omp.h>
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iostream>
+#include <map>
+#include <set>
+#include <sstream>
+#include <tuple>
+
+namespace decant {
+#if DECANT_HAS_CUDA
+namespace gpu::cuda {
+void choose_fault(int number);
+}
+#endif
+
+namespace {
+
+struct Trial {
+  int number = 0;  // 0: no fault
+  std::string backend, fixture;
+  CheckSelection checks = all_checks();
+};
+
+/// What one trial's process said before it ended.
+struct Outcome {
+  bool caught = false;  // by anything
+  std::string ended;    // "", "crash", "hang"
+  /// Largest score of the failing rows by check, infinite where there was nothing to compare.
+  std::map<std::string, double> failed;
+};
+
+/// The fixtures' oracles, prepared before any process is split off.
+struct Prepared {
+  Fixture fixture;
+  Judgement oracle;
+};
+
+void say(const CheckRow& row, std::ostream& out) {
+  if (judged_verdict(row) == Verdict::pass) return;
+  out << row.check << '\t' << row.field << '\t' << row.score << '\n';
+}
+
+void choose(Executor executor, int number) {
+  gpu::fault_on_host = number;
+#if DECANT_HAS_CUDA
+  if (executor == Executor::cuda) gpu::cuda::choose_fault(number);
+#else
+  (void)executor;
+#endif
+}
+
+/// In the child: judges and writes the failing rows to `to`.
+void judge_into(int to, const Trial& trial, Executor executor, const Prepared& p) {
+  const auto colon = trial.backend.find(':');
+  const auto options = colon == std::string::npos ? "" : trial.backend.substr(colon + 1);
+  choose(executor, trial.number);
+  const auto backend = make_backend(trial.backend.substr(0, colon), executor, options);
+  std::ostringstream out;
+  for (const CheckRow& row : judge(*backend, p.fixture, p.oracle, trial.checks)) say(row, out);
+  out << "end\n";
+  const std::string text = out.str();
+  for (std::size_t at = 0; at < text.size();) {
+    const ssize_t written = write(to, text.data() + at, text.size() - at);
+    if (written <= 0) _exit(4);
+    at += static_cast<std::size_t>(written);
+  }
+}
+
+struct Child {
+  pid_t pid;
+  int from;
+  std::size_t trial;
+};
+
+Child start(std::size_t index, const Trial& trial, Executor executor, const Prepared& p) {
+  int ends[2];
+  if (pipe(ends) != 0) throw std::runtime_error("no pipe");
+  const pid_t pid = fork();
+  if (pid < 0) throw std::runtime_error("no process");
+  if (pid == 0) {
+    close(ends[0]);
+    alarm(60);
+    try {
+      judge_into(ends[1], trial, executor, p);
+    } catch (const std::exception& error) {
+      std::cerr << trial.number << ": " << error.what() << '\n';
+      _exit(5);
+    }
+    _exit(0);  // no destructors: a broken backend may not survive its own
+  }
+  close(ends[1]);
+  return {pid, ends[0], index};
+}
+
+Outcome outcome_of(const Child& child) {
+  Outcome o;
+  std::string text;
+  char buffer[4096];
+  for (ssize_t n; (n = read(child.from, buffer, sizeof buffer)) > 0;)
+    text.append(buffer, static_cast<std::size_t>(n));
+  close(child.from);
+  int status = 0;
+  waitpid(child.pid, &status, 0);
+  std::istringstream lines(text);
+  bool whole = false;
+  for (std::string line; std::getline(lines, line);) {
+    if (line == "end") {
+      whole = true;
+      continue;
+    }
+    std::istringstream columns(line);
+    std::string check, field, score;
+    std::getline(columns, check, '\t');
+    std::getline(columns, field, '\t');
+    std::getline(columns, score);
+    const double value = std::stod(score);
+    const auto known = o.failed.find(check);
+    if (known == o.failed.end() || !(value <= known->second)) o.failed[check] = value;
+  }
+  if (!whole) o.ended = WIFSIGNALED(status) && WTERMSIG(status) == SIGALRM ? "hang" : "crash";
+  o.caught = !o.failed.empty() || !whole;
+  return o;
+}
+
+std::vector<Outcome> run_all(const std::vector<Trial>& trials, Executor executor, int jobs,
+                             const std::map<std::string, Prepared>& prepared) {
+  std::vector<Outcome> outcomes(trials.size());
+  std::vector<Child> running;
+  std::size_t next = 0, done = 0;
+  while (done < trials.size()) {
+    while (next < trials.size() && running.size() < static_cast<std::size_t>(jobs)) {
+      running.push_back(start(next, trials[next], executor, prepared.at(trials[next].fixture)));
+      ++next;
+    }
+    outcomes[running.front().trial] = outcome_of(running.front());
+    running.erase(running.begin());
+    ++done;
+  }
+  return outcomes;
+}
+
+/// Trials of a backend without a fault, which must pass: "brute on hostile-exact-support fails …".
+std::string failures_without_fault(const std::vector<Trial>& trials, Executor executor, int jobs,
+                                   const std::map<std::string, Prepared>& prepared) {
+  std::string text;
+  const auto outcomes = run_all(trials, executor, jobs, prepared);
+  for (std::size_t t = 0; t < trials.size(); ++t)
+    if (outcomes[t].caught)
+      text += fmt::format("without a fault: {} fails on {} ({})\n", trials[t].backend,
+                          trials[t].fixture,
+                          outcomes[t].failed.empty() ? outcomes[t].ended
+                                                     : outcomes[t].failed.begin()->first);
+  return text;
+}
+
+/// Every pair of backend and fixture once, without a fault.
+std::vector<Trial> clean(const std::vector<Trial>& trials) {
+  std::set<std::pair<std::string, std::string>> pairs;
+  for (const Trial& t : trials) pairs.emplace(t.backend, t.fixture);
+  std::vector<Trial> all;
+  for (const auto& [backend, fixture] : pairs) all.push_back({0, backend, fixture});
+  return all;
+}
+
+std::map<std::string, Prepared> prepare_all(const std::vector<Trial>& trials,
+                                            const std::filesystem::path& folder) {
+  std::map<std::string, Prepared> prepared;
+  for (const Trial& t : trials) {
+    if (prepared.count(t.fixture)) continue;
+    Fixture fixture = read_fixture(folder / (t.fixture + ".h5"));
+    Judgement oracle = prepare(fixture);
+    prepared.emplace(t.fixture, Prepared{std::move(fixture), std::move(oracle)});
+  }
+  return prepared;
+}
+
+struct Settings {
+  std::string list, folder = "fixtures", executor = "host", out, equivalent;
+  std::vector<std::string> only;
+  int jobs = 2;
+  bool verbose = false;
+};
+
+int finish(const Settings& s, const std::string& table, bool passes) {
+  std::cout << table;
+  if (!s.out.empty()) std::ofstream(s.out) << table;
+  return passes ? 0 : 1;
+}
+
+std::string joined(const std::map<std::string, double>& failed, const std::string& but) {
+  std::string names;
+  for (const auto& [name, score] : failed)
+    if (name != but) names += (names.empty() ? "" : ", ") + name;
+  return names;
+}
+
+/// The catalogue: each fault against the check that is there for it.
+int run_catalogue(const Settings& s, const nlohmann::json& faults, Executor executor) {
+  std::vector<Trial> trials;
+  std::vector<nlohmann::json> planted;
+  std::size_t not_run = 0;
+  for (const auto& f : faults) {
+    if (!s.only.empty() && std::count(s.only.begin(), s.only.end(), f["name"]) == 0) continue;
+    if (f["on"] == "cuda" && executor != Executor::cuda) {
+      ++not_run;
+      continue;
+    }
+    trials.push_back({f["number"], f["backend"], f["fixture"]});
+    planted.push_back(f);
+  }
+  const auto prepared = prepare_all(trials, s.folder);
+  const auto outcomes = run_all(trials, executor, s.jobs, prepared);
+  std::string table = fmt::format("{:<26} {:<17} {:<16} {:>9}  {}\n", "fault", "backend",
+                                  "check", "factor", "what is wrong; what fails besides");
+  std::size_t caught = 0, near = 0;
+  for (std::size_t t = 0; t < trials.size(); ++t) {
+    const Outcome& o = outcomes[t];
+    const std::string check = planted[t]["check"];
+    const auto hit = o.failed.find(check);
+    caught += hit != o.failed.end();
+    near += hit != o.failed.end() && hit->second < 10;
+    const std::string factor = hit == o.failed.end()  ? o.caught ? "ELSEWHERE" : "MISSED"
+                               : !(hit->second < 1e6) ? "no bound"
+                                                      : fmt::format("{:.3g}", hit->second);
+    const std::string others = joined(o.failed, check);
+    table += fmt::format("{:<26} {:<17} {:<16} {:>9}  {}; {}\n",
+                         planted[t]["name"].get<std::string>(), trials[t].backend, check, factor,
+                         planted[t]["what"].get<std::string>(),
+                         !o.ended.empty()   ? o.ended
+                         : others.empty() ? "nothing"
+                                            : others);
+  }
+  for (const auto& f : faults)
+    if (s.only.empty() && f["on"] == "cuda" && executor != Executor::cuda)
+      table += fmt::format("{:<26} {:<17} {:<16} {:>9}  {}\n", f["name"].get<std::string>(),
+                           f["backend"].get<std::string>(), f["check"].get<std::string>(), "not_run",
+                           f["what"].get<std::string>());
+  const std::string wrong = failures_without_fault(clean(trials), executor, s.jobs, prepared);
+  table += wrong + fmt::format("{} of {} caught by the check that is there for it, {} by a factor below 10; "
+                               "{} not_run here; without a fault {}\n",
+                               caught, trials.size(), near, not_run,
+                               wrong.empty() ? "all pass" : "SOME FAIL");
+  return finish(s, table, caught == trials.size() && wrong.empty());
+}
+
+/// What a mutation is tried on, until something fails.
+const std::vector<std::pair<std::string, std::string>>& attempts() {
+  static const std::vector<std::pair<std::string, std::string>> all = {
+      {"list", "pour-4k-stream"},
+      {"hash", "pour-4k-settled"},
+      {"hash", "hostile-periodic"},
+      {"list", "hostile-periodic"},
+      {"hash", "hostile-crowd"},
+      {"hash", "hostile-coincident"},
+      {"list:skin=0.05", "pour-4k-splash"},
+      {"list:trigger=local:skin=0.05", "pour-4k-splash"},
+      {"hash:source=rebuilt:sort=thrust", "pour-4k-stream"},
+      {"hash:pairs=rescan:grid=fluid", "pour-4k-stream"},
+      {"list:build=all-pairs", "hostile-exact-support"},
+      {"brute", "pour-4k-stream"},
+      {"brute", "hostile-periodic"},
+      {"brute", "hostile-exact-support"},
+      {"hash", "hostile-exact-support"},
+      {"hash", "hostile-outliers"},
+      {"hash", "pour-4k-rest"},
+  };
+  return all;
+}
+
+/// Mutations: each must be caught by anything, or stand in the file of equivalent ones with a reason.
+int run_mutations(const Settings& s, const nlohmann::json& faults, Executor executor) {
+  nlohmann::json equivalent = nlohmann::json::object();
+  if (!s.equivalent.empty()) std::ifstream(s.equivalent) >> equivalent;
+  std::vector<std::string> by(faults.size());
+  std::vector<Trial> used;
+  for (const auto& [backend, fixture] : attempts()) used.push_back({0, backend, fixture});
+  const auto prepared = prepare_all(used, s.folder);
+  // Most show at once in the fields; only what does not is worth a run.
+  const CheckSelection quick{"fields", "substep"};
+  std::vector<std::tuple<std::string, std::string, CheckSelection>> rounds;
+  for (const CheckSelection& checks : {quick, all_checks()})
+    for (const auto& [backend, fixture] : attempts()) rounds.emplace_back(backend, fixture, checks);
+  for (const auto& [backend, fixture, checks] : rounds) {
+    std::vector<Trial> trials;
+    std::vector<std::size_t> which;
+    for (std::size_t k = 0; k < faults.size(); ++k) {
+      if (!by[k].empty()) continue;
+      if ((faults[k]["file"] == "brute_force.cuh") != (backend == "brute") &&
+          faults[k]["file"] == "brute_force.cuh")
+        continue;
+      trials.push_back({faults[k]["number"], backend, fixture, checks});
+      which.push_back(k);
+    }
+    const auto outcomes = run_all(trials, executor, s.jobs, prepared);
+    if (s.verbose) {
+      std::cerr << fmt::format("{} on {}: {} left\n", backend, fixture, trials.size());
+      for (const auto k : which)
+        std::cerr << "  " << faults[k]["name"].get<std::string>() << '\n';
+    }
+    for (std::size_t t = 0; t < trials.size(); ++t)
+      if (outcomes[t].caught)
+        by[which[t]] = fmt::format("{}, {}: {}", backend, fixture,
+                                   outcomes[t].ended.empty() ? joined(outcomes[t].failed, "")
+                                                             : outcomes[t].ended);
+  }
+  std::size_t caught = 0, explained = 0;
+  std::string table;
+  for (std::size_t k = 0; k < faults.size(); ++k) {
+    const std::string line = faults[k]["line"], what = faults[k]["what"];
+    std::string verdict = by[k];
+    if (!verdict.empty()) {
+      ++caught;
+    } else if (equivalent.contains(line) && equivalent[line].contains(what)) {
+      verdict = "equivalent: " + equivalent[line][what].get<std::string>();
+      ++explained;
+    } else {
+      verdict = "SURVIVES";
+    }
+    table += fmt::format("{:<24} {}: {}\n{:<24} {}\n", faults[k]["name"].get<std::string>(), what, line,
+                         "", verdict);
+  }
+  const std::string wrong = failures_without_fault(used, executor, s.jobs, prepared);
+  table += wrong + fmt::format("{} mutations: {} caught, {} equivalent with a reason, {} survive; without a "
+                               "mutation {}\n",
+                               faults.size(), caught, explained, faults.size() - caught - explained,
+                               wrong.empty() ? "all pass" : "SOME FAIL");
+  return finish(s, table, caught + explained == faults.size() && wrong.empty());
+}
+
+int run(const Settings& s) {
+  const Executor executor = s.executor == "cuda" ? Executor::cuda : Executor::host;
+  nlohmann::json faults;
+  std::ifstream(s.list) >> faults;
+  // One thread a process; nobody has threads when processes split off.
+  omp_set_num_threads(1);
+  const bool mutations = !faults.empty() && !faults[0].contains("check");
+  return mutations ? run_mutations(s, faults, executor) : run_catalogue(s, faults, executor);
+}
+
+}  // namespace
+}  // namespace decant
+
+int main(int argc, char** argv) {
+  decant::Settings s;
+  CLI::App app("Judges the planted faults, or the mutations, of an altered build.");
+  app.add_option("LIST", s.list, "faults.json of plant.py")->required();
+  app.add_option("--fixtures", s.folder, "folder of recordings")->capture_default_str();
+  app.add_option("--executor", s.executor, "host or cuda")->check(CLI::IsMember({"host", "cuda"}));
+  app.add_option("--jobs", s.jobs, "processes at a time")->capture_default_str();
+  app.add_option("--only", s.only, "names of faults");
+  app.add_option("--equivalent", s.equivalent, "mutations that change nothing, with reasons");
+  app.add_flag("--verbose", s.verbose, "say how far it is");
+  app.add_option("--out", s.out, "write the table");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    return decant::run(s);
+  } catch (const std::exception& error) {
+    std::cerr << error.what() << '\n';
+    return 2;
+  }
+}
