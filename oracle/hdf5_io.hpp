@@ -37,13 +37,15 @@ class Hdf5Reader {
   std::vector<std::string> children(const std::string& group) const;
   /// Extent by axis; empty for a scalar.
   std::vector<std::int64_t> shape(const std::string& path) const;
+  /// Whether a dataset's type is an integer.
+  bool holds_integers(const std::string& path) const;
   /// [n] dataset of reals; n < 0 takes any length.
   Eigen::VectorXd vector(const std::string& path, std::int64_t n = -1) const;
   /// [n,3] dataset of reals as 3×n.
   Eigen::Matrix3Xd matrix3(const std::string& path, std::int64_t n = -1) const;
-  /// [n] dataset of integers of any width; one beyond int64 is refused.
   /// One entry of a [T,n,3] dataset as 3×n.
   Eigen::Matrix3Xd matrix3_at(const std::string& path, std::int64_t index) const;
+  /// [n] dataset of integers of any width; one beyond int64 is refused.
   IdVector integers(const std::string& path, std::int64_t n = -1) const;
   /// [n] dataset of strings.
   std::vector<std::string> strings(const std::string& path, std::int64_t n = -1) const;

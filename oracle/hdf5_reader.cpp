@@ -300,6 +300,12 @@ std::vector<std::int64_t> Hdf5Reader::shape(const std::string& path) const {
   return {dims.begin(), dims.end()};
 }
 
+bool Hdf5Reader::holds_integers(const std::string& path) const {
+  const Handle object = open_object(*this, id_, path);
+  if (H5Iget_type(object.get()) != H5I_DATASET) fail(path, "a group", "a dataset");
+  return H5Tget_class(Handle(H5Dget_type(object.get())).get()) == H5T_INTEGER;
+}
+
 Eigen::VectorXd Hdf5Reader::vector(const std::string& path, std::int64_t n) const {
   const Dataset data = open_dataset(*this, id_, path, H5T_FLOAT, 1, n);
   Eigen::VectorXd values(static_cast<Eigen::Index>(data.count));

@@ -29,6 +29,9 @@ void add_conform_command(CLI::App& app, int& exit_status);
 /// `decant bench`: what a substep costs.
 void add_bench_command(CLI::App& app, int& exit_status);
 
+/// `decant export`: what a solver in another language needs of a fixture.
+void add_export_command(CLI::App& app, int& exit_status);
+
 /// `decant record`: runs the oracle and writes a fixture.
 void add_record_command(CLI::App& app, int& exit_status);
 

@@ -4,11 +4,12 @@
 #include "oracle/conform.hpp"
 #include "reference/error.hpp"
 #include "tools/backend_choice.hpp"
+#include "tools/build_provenance.hpp"
 #include "tools/commands.hpp"
 #include "tools/fixture_folder.hpp"
 #include "tools/output_place.hpp"
 #include "tools/progress.hpp"
-#include "version.hpp"
+#include "tools/results_judgement.hpp"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -26,6 +27,7 @@ struct ConformArguments {
   BackendFlags flags;
   std::vector<std::string> fixtures, backends, checks;
   std::string executor = "auto", report, explain;
+  std::string results, oracle, name;
   bool all = false, json = false, quiet = false;
 };
 
@@ -39,6 +41,9 @@ constexpr const char* footer =
     "run\n"
     "(a backend that breaks down while it is judged does not conform),\n"
     "77 the device of --executor is absent.\n"
+    "\n"
+    "--results judges fields that were computed elsewhere: what is given must pass; what is not given\n"
+    "is not_run in the report and leaves the exit status alone (3 where nothing is given).\n"
     "\n"
     "Example:\n"
     "  decant conform --backend brute --report build/conform.h5";
@@ -138,11 +143,7 @@ Report judge_all(std::vector<Candidate>& candidates, const std::vector<Fixture>&
 void add_provenance(Report& report, const std::vector<Candidate>& candidates,
                     const std::vector<Fixture>& fixtures) {
   auto& p = report.provenance;
-  p["version"] = version;
-  p["git_revision"] = git_revision;
-  p["compiler"] = compiler;
-  p["flags"] = flags;
-  p["build_type"] = build_type;
+  p = build_provenance();
   for (const auto& c : candidates)
     p["device." + c.info.name] = c.backend ? c.info.executor + ": " + c.info.device : c.why_not;
   for (const auto& f : fixtures) p["fixture_sha256." + f.name] = f.sha256;
@@ -159,7 +160,7 @@ int status_of(const Report& report, const std::vector<Candidate>& candidates) {
   return status == exit_failure && absent && only_the_device ? exit_device_absent : status;
 }
 
-std::string json_text(const Report& report, int status) {
+std::string json_text(const Report& report, const std::string& line, int status) {
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
   for (const auto& r : report.rows)
     rows.push_back({{"backend", r.backend},
@@ -180,7 +181,7 @@ std::string json_text(const Report& report, int status) {
                     {"excluded", r.excluded},
                     {"verdict", to_string(judged_verdict(r))},
                     {"reason", judged_reason(r)}});
-  const nlohmann::ordered_json all = {{"summary", verdict_line(report)},
+  const nlohmann::ordered_json all = {{"summary", line},
                                       {"exit_status", status},
                                       {"rows", rows},
                                       {"provenance", report.provenance}};
@@ -199,8 +200,39 @@ int explain(const std::string& name) {
   return exit_pass;
 }
 
+/// Prints what was asked for and writes the report.
+int hand_over(const ConformArguments& arguments, const Report& report, int status,
+              const std::string& table, const std::string& line) {
+  if (arguments.json)
+    fmt::print("{}\n", json_text(report, line, status));
+  else if (arguments.quiet)
+    fmt::print("{}\n", line);
+  else
+    fmt::print("{}", table);
+  std::fflush(stdout);
+  // After the table: what was found out is not lost with a full disk.
+  if (!arguments.report.empty()) write_report(arguments.report, report);
+  return status;
+}
+
+int conform_results(const ConformArguments& arguments) {
+  if (arguments.results.empty())
+    throw InputError("command line", "--results", "not given", "required with --oracle and --name");
+  if (!arguments.backends.empty() || arguments.all || arguments.executor != "auto")
+    throw InputError("command line", "--results", arguments.results,
+                     "instead of --backend, --executor and --all: nothing is run");
+  arguments.flags.require_used();
+  check_output_place("--report", arguments.report);
+  const ResultsOutcome outcome =
+      judge_results_file({arguments.results, arguments.fixtures, arguments.oracle, arguments.name,
+                          arguments.checks});
+  return hand_over(arguments, outcome.report, outcome.status, outcome.table, outcome.line);
+}
+
 int conform(ConformArguments& arguments) {
   if (!arguments.explain.empty()) return explain(arguments.explain);
+  if (!arguments.results.empty() || !arguments.oracle.empty() || !arguments.name.empty())
+    return conform_results(arguments);
   const CheckSelection checks =
       arguments.checks.empty() ? all_checks() : parse_checks(arguments.checks);
   check_output_place("--report", arguments.report);
@@ -216,16 +248,7 @@ int conform(ConformArguments& arguments) {
   Report report = judge_all(candidates, fixtures, checks, !talks);
   add_provenance(report, candidates, fixtures);
   const int status = status_of(report, candidates);
-  if (arguments.json)
-    fmt::print("{}\n", json_text(report, status));
-  else if (arguments.quiet)
-    fmt::print("{}\n", verdict_line(report));
-  else
-    fmt::print("\n{}", console_table(report));
-  std::fflush(stdout);
-  // After the table: what was found out is not lost with a full disk.
-  if (!arguments.report.empty()) write_report(arguments.report, report);
-  return status;
+  return hand_over(arguments, report, status, "\n" + console_table(report), verdict_line(report));
 }
 
 }  // namespace
@@ -246,6 +269,11 @@ void add_conform_command(CLI::App& app, int& exit_status) {
   verb->add_option("--explain", arguments->explain,
                    "say what a check compares and why its bound is what it is; judges nothing");
   arguments->flags.add_to(*verb);
+  verb->add_option("--results", arguments->results,
+                   "judge this file's fields (oracle/results-format.md) instead of a backend");
+  verb->add_option("--oracle", arguments->oracle,
+                   "their own reference, for --results of their own states");
+  verb->add_option("--name", arguments->name, "what the report calls --results; default: its file");
   verb->add_option("--report", arguments->report, "write an HDF5 report");
   verb->add_flag("--json", arguments->json, "rows as JSON instead of the table");
   verb->add_flag("--quiet", arguments->quiet, "the verdict's line alone");

@@ -41,6 +41,7 @@ int main(int argc, char** argv) {
   add_pour_command(app, status);
   add_record_command(app, status);
   add_conform_command(app, status);
+  add_export_command(app, status);
   add_bench_command(app, status);
   add_info_command(app, status);
   try {

@@ -1,0 +1,229 @@
+/// \file
+/// A port of their solver against their reference: the tolerance is what the reference states, term
+/// by term, and where it states none nothing passes.
+#include "oracle/named_fields.hpp"
+
+#include "tests/results_fixture.hpp"
+
+#include <cmath>
+#include <limits>
+
+namespace decant {
+namespace {
+
+/// A reference of one field "x" of four particles, and the port's answer to it.
+class NamedFields : public test::ResultsFile {
+ protected:
+  void SetUp() override { x_ << 1, -2, 3, 4; }
+
+  static void reference(const std::function<void(Hdf5Writer&)>& fill) {
+    Hdf5Writer out(reference_file());
+    out.attribute("/", "decant_reference", 1);
+    fill(out);
+    out.commit();
+  }
+  static void port(const std::function<void(Hdf5Writer&)>& fill) {
+    Hdf5Writer out(results_file());
+    out.attribute("/", "decant_results", 1);
+    fill(out);
+    out.commit();
+  }
+  static ResultsOutcome judged() {
+    return judge_results_file({results_file(), {}, reference_file(), "port", {}});
+  }
+  /// Status where the port's particle 2 is off by `error`.
+  int status_off_by(double error) const {
+    Eigen::VectorXd off = x_;
+    off[2] += error;
+    port([&](Hdf5Writer& out) { out.vector("/fields/x", off, ""); });
+    return judged().status;
+  }
+
+  Eigen::VectorXd x_ = Eigen::VectorXd(4);
+};
+
+TEST_F(NamedFields, AreBoundByTheirConditionSums) {
+  const auto bounded = [&](const std::function<void(Hdf5Writer&)>& more) {
+    reference([&](Hdf5Writer& out) {
+      out.vector("/fields/x", x_, "");
+      out.vector("/condition/x", Eigen::VectorXd::Constant(4, 10.0), "");
+      more(out);
+    });
+  };
+  const auto expect_bound = [&](double bound) {
+    EXPECT_EQ(status_off_by(0.999 * bound), 0) << bound;
+    EXPECT_EQ(status_off_by(1.001 * bound), 1) << bound;
+  };
+  bounded([](Hdf5Writer& out) { out.integers("/terms/x", IdVector::LinSpaced(4, 9, 36)); });
+  expect_bound((std::sqrt(27.0) + 8) * 0x1p-24 * 10);
+  bounded([](Hdf5Writer& out) { out.attribute("/condition/x", "terms", 100); });
+  expect_bound((10 + 8) * 0x1p-24 * 10);
+  bounded([](Hdf5Writer& out) {
+    out.attribute("/condition/x", "terms", 100);
+    out.attribute("/condition/x", "c", 2.0);
+    out.attribute("/condition/x", "precision", 0x1p-11);
+    out.attribute("/fields/x", "tolerance", 0.5);
+  });
+  expect_bound((10 + 2) * 0x1p-11 * 10 + 0.5);
+}
+
+TEST_F(NamedFields, AreBoundByStatedTolerances) {
+  reference([&](Hdf5Writer& out) {
+    out.vector("/fields/x", x_, "");
+    out.attribute("/fields/x", "tolerance", 0.25);
+    out.attribute("/fields/x", "relative", 0.5);
+  });
+  const double bound = 0.25 + 0.5 * std::sqrt((1.0 + 4 + 9 + 16) / 4);
+  EXPECT_EQ(status_off_by(0.999 * bound), 0);
+  EXPECT_EQ(status_off_by(1.001 * bound), 1);
+  EXPECT_EQ(row_of(judged(), "fields", "x").worst_id, 2);
+}
+
+TEST_F(NamedFields, WithoutAToleranceAreNotRun) {
+  reference([&](Hdf5Writer& out) { out.vector("/fields/x", x_, ""); });
+  EXPECT_EQ(status_off_by(0), 3);
+  const ResultsOutcome outcome = judged();
+  EXPECT_EQ(row_of(outcome, "fields", "x").verdict, Verdict::not_run);
+  EXPECT_NE(row_of(outcome, "fields", "x").reason.find("no tolerance"), std::string::npos);
+}
+
+TEST_F(NamedFields, TakeNoToleranceFromThePort) {
+  reference([&](Hdf5Writer& out) {
+    out.vector("/fields/x", x_, "");
+    out.attribute("/fields/x", "tolerance", 0.25);
+  });
+  port([&](Hdf5Writer& out) {
+    out.vector("/fields/x", 2 * x_, "");
+    out.attribute("/fields/x", "tolerance", 100.0);
+  });
+  EXPECT_EQ(judged().status, 1);
+}
+
+TEST_F(NamedFields, FailWhereAValueIsNoNumber) {
+  reference([&](Hdf5Writer& out) {
+    out.vector("/fields/x", x_, "");
+    out.attribute("/fields/x", "tolerance", 1e9);
+  });
+  EXPECT_EQ(status_off_by(std::nan("")), 1);
+  EXPECT_EQ(status_off_by(std::numeric_limits<double>::infinity()), 1);
+}
+
+TEST_F(NamedFields, OfIntegersAreExact) {
+  reference([](Hdf5Writer& out) { out.integers("/fields/count", IdVector::LinSpaced(4, 1, 4)); });
+  port([](Hdf5Writer& out) { out.integers("/fields/count", IdVector::LinSpaced(4, 1, 4)); });
+  EXPECT_EQ(judged().status, 0);
+  port([](Hdf5Writer& out) { out.integers("/fields/count", IdVector::LinSpaced(4, 0, 3)); });
+  EXPECT_EQ(judged().status, 1);
+}
+
+TEST_F(NamedFields, MayHaveSeveralStatesAndVectors) {
+  const Eigen::Matrix3Xd v = Eigen::Matrix3Xd::Constant(3, 5, 2.0);
+  reference([&](Hdf5Writer& out) {
+    for (const char* state : {"/early", "/late"}) {
+      out.matrix3(std::string(state) + "/fields/v", v, "m/s");
+      out.attribute(std::string(state) + "/fields/v", "tolerance", 0.1);
+    }
+  });
+  Eigen::Matrix3Xd off = v;
+  off(1, 3) += 0.2;
+  port([&](Hdf5Writer& out) { out.matrix3("/early/fields/v", v, "m/s"); });
+  EXPECT_EQ(judged().status, 0);
+  EXPECT_EQ(row_of(judged(), "fields", "v").fixture, "reference/early");
+  EXPECT_EQ(exit_status(judged().report), 3) << "late is not there";
+  port([&](Hdf5Writer& out) {
+    out.matrix3("/early/fields/v", v, "m/s");
+    out.matrix3("/late/fields/v", off, "m/s");
+  });
+  EXPECT_EQ(judged().status, 1);
+  EXPECT_EQ(judged().report.rows[1].worst_id, 3);
+  EXPECT_EQ(judged().report.rows[1].n, 15);
+}
+
+TEST_F(NamedFields, AreMatchedByIdInBothFiles) {
+  IdVector ids(4), others(4);
+  ids << 10, 30, 20, 40;
+  others << 40, 30, 20, 10;
+  const auto put = [](Hdf5Writer& out, const IdVector& id, const Eigen::VectorXd& values) {
+    out.integers("/id", id);
+    out.vector("/fields/x", values, "");
+  };
+  reference([&](Hdf5Writer& out) {
+    put(out, ids, x_);
+    out.attribute("/fields/x", "tolerance", 0.1);
+  });
+  Eigen::VectorXd turned(4);
+  turned << x_[3], x_[1], x_[2], x_[0];
+  port([&](Hdf5Writer& out) { put(out, others, turned); });
+  EXPECT_EQ(judged().status, 0);
+  turned[1] += 1;
+  port([&](Hdf5Writer& out) { put(out, others, turned); });
+  EXPECT_EQ(judged().status, 1);
+  EXPECT_EQ(row_of(judged(), "fields", "x").worst_id, 30);
+
+  others[0] = 30;
+  port([&](Hdf5Writer& out) { put(out, others, turned); });
+  EXPECT_EQ(judged().status, 1);
+  EXPECT_EQ(row_of(judged(), "ids", "id").reason, "id 40 is missing, id 30 is there 2 times");
+  EXPECT_EQ(row_of(judged(), "fields", "x").verdict, Verdict::not_run);
+}
+
+TEST_F(NamedFields, ThatTheReferenceDoesNotHaveAreNotRun) {
+  reference([&](Hdf5Writer& out) {
+    out.vector("/fields/x", x_, "");
+    out.attribute("/fields/x", "tolerance", 0.25);
+  });
+  port([&](Hdf5Writer& out) {
+    out.vector("/fields/x", x_, "");
+    out.vector("/fields/y", x_, "");
+  });
+  EXPECT_EQ(judged().status, 3);
+  EXPECT_EQ(row_of(judged(), "fields", "y").verdict, Verdict::not_run);
+}
+
+TEST_F(NamedFields, OfAnotherShapeOrUnitAreRefused) {
+  reference([&](Hdf5Writer& out) {
+    out.vector("/fields/x", x_, "m");
+    out.attribute("/fields/x", "tolerance", 0.25);
+  });
+  port([&](Hdf5Writer& out) { out.vector("/fields/x", x_.head(3), "m"); });
+  expect_refused(judged, "/fields/x");
+  port([&](Hdf5Writer& out) { out.matrix3("/fields/x", Eigen::Matrix3Xd::Zero(3, 4), "m"); });
+  expect_refused(judged, "/fields/x");
+  port([&](Hdf5Writer& out) { out.vector("/fields/x", x_, "mm"); });
+  expect_refused(judged, "/fields/x@unit");
+}
+
+TEST_F(NamedFields, NeedAReferenceThatIsSound) {
+  port([&](Hdf5Writer& out) { out.vector("/fields/x", x_, ""); });
+  const auto with = [&](const std::function<void(Hdf5Writer&)>& more) {
+    reference([&](Hdf5Writer& out) {
+      out.vector("/fields/x", x_, "");
+      more(out);
+    });
+  };
+  with([](Hdf5Writer& out) { out.attribute("/fields/x", "tolerance", -1.0); });
+  expect_refused(judged, "/fields/x@tolerance");
+  with([](Hdf5Writer& out) { out.attribute("/fields/x", "relative", std::nan("")); });
+  expect_refused(judged, "/fields/x@relative");
+  with([](Hdf5Writer& out) { out.vector("/condition/x", Eigen::VectorXd::Ones(4), ""); });
+  expect_refused(judged, "/terms/x");
+  with([](Hdf5Writer& out) { out.vector("/condition/y", Eigen::VectorXd::Ones(4), ""); });
+  expect_refused(judged, "/condition/y");
+  with([](Hdf5Writer& out) { out.integers("/terms/x", IdVector::Ones(4)); });
+  expect_refused(judged, "/condition/x");
+  with([](Hdf5Writer& out) {
+    out.vector("/condition/x", Eigen::VectorXd::Constant(4, -1.0), "");
+    out.attribute("/condition/x", "terms", 3);
+  });
+  expect_refused(judged, "/condition/x");
+  with([](Hdf5Writer& out) { out.integers("/id", IdVector::Ones(4)); });
+  expect_refused(judged, "/id");
+  x_[1] = std::nan("");
+  with([](Hdf5Writer& out) { out.attribute("/fields/x", "tolerance", 1.0); });
+  expect_refused(judged, "/fields/x");
+  reference([](Hdf5Writer&) {});
+  expect_refused(judged, "/fields");
+}
+
+}  // namespace
+}  // namespace decant
