@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Holds a fixture or a report to its schema document.
+"""Holds a fixture, a report, or a file for or from a port that is not linked to its schema document.
 
     check_schema.py FILE.h5 …
 
-Reads the table in oracle/fixture-format.md or oracle/report-format.md and compares names, dtypes,
-shapes and units with what stands in the file. Exit status: 0 as documented, 1 not, 2 bad input.
+Reads the table in oracle/fixture-format.md, report-format.md or results-format.md and compares names,
+dtypes, shapes and units with what stands in the file. Exit status: 0 as documented, 1 not, 2 bad input.
 """
 
 import json
@@ -23,7 +23,7 @@ def rows_of(document):
     rows = []
     for line in document.read_text(encoding="utf-8").splitlines():
         cells = [c.strip() for c in re.split(r"(?<!\\)\|", line)[1:-1]]
-        if cells and cells[0].startswith("`/"):
+        if cells and cells[0].startswith(("`/", "`STATE")):
             rows.append((cells[0].strip("`"), *cells[1:5]))
     if not rows:
         raise SystemExit(f"{document}: no table")
@@ -32,6 +32,12 @@ def rows_of(document):
 
 def dtype_of(dtype):
     return "string" if dtype.kind == "S" else dtype.name
+
+
+def is_of(dtype, expected):
+    """Whether a dtype is the documented one; "real", "integer" and "real or integer" are classes."""
+    kinds = {"real": "f", "integer": "iu", "real or integer": "fiu"}
+    return dtype.kind in kinds[expected] if expected in kinds else dtype_of(dtype) == expected
 
 
 class Checker:
@@ -48,6 +54,8 @@ class Checker:
             if found != ():
                 self.complain(path, f"shape {list(found)}, expected a scalar")
             return
+        if expected == "[N…]":
+            expected = "[N,3]" if len(found) == 2 else "[N]"
         letters = expected.strip("[]").split(",")
         if len(letters) != len(found):
             self.complain(path, f"shape {list(found)}, expected {expected}")
@@ -65,11 +73,11 @@ class Checker:
         if not isinstance(item, h5py.Dataset):
             self.complain(path, "missing")
             return
-        if dtype_of(item.dtype) != dtype:
+        if not is_of(item.dtype, dtype):
             self.complain(path, f"dtype {item.dtype}, expected {dtype}")
         self.shape(path, item.shape, shape, scope)
         found = item.attrs.get("unit", b"").decode()
-        if unit != "the row's" and found != unit:
+        if unit not in ("the row's", "the field's", "any") and found != unit:
             self.complain(path, f'unit "{found}", expected "{unit}"')
 
     def attribute(self, owner, name, dtype):
@@ -80,7 +88,7 @@ class Checker:
             return
         for each in item.attrs if name == "*" else [name]:
             found = item.attrs.get_id(each)
-            if dtype_of(found.dtype) != dtype or found.shape != ():
+            if not is_of(found.dtype, dtype) or found.shape != ():
                 self.complain(f"{owner}@{each}", f"{found.dtype} {found.shape}, expected {dtype} scalar")
 
     def row(self, path, dtype, shape, unit, scope=""):
@@ -127,6 +135,29 @@ def check_report(check, rows):
         check.complain(f"/summary/{name}", "not in the document")
 
 
+def check_parts(check, rows, kind):
+    """Inputs, results, references: rows of this kind, and those of kind? where they are there."""
+    file = check.file
+    named = {path for path, *_ in rows}
+    states = [""] if "fields" in file else [f"/{k}" for k in file if f"{k}/fields" in file]
+    for path, dtype, shape, unit, where in rows:
+        kinds = {k.strip() for k in where.split(",")}
+        if not kinds & {kind, kind + "?"}:
+            continue
+        for state in states if path.startswith("STATE") else [""]:
+            owner, at, attribute = path.replace("STATE", state).partition("@")
+            names = sorted(file.get(owner[:-2], ())) if owner.endswith("/*") else [""]
+            for one in (owner.replace("*", name) for name in names):
+                there = one in file and (not at or attribute in file[one].attrs)
+                if (one in named and one != path) or (kind not in kinds and not there):
+                    continue
+                # Who writes results or a reference may leave units out.
+                stated = kind == "inputs" or (there and "unit" in file[one].attrs)
+                check.row(one + at + attribute, dtype, shape, unit if stated else "any", state)
+    if kind == "reference" and not states:
+        check.complain("/fields", "missing")
+
+
 def complaints_about(path):
     try:
         file = h5py.File(path, "r")
@@ -140,8 +171,12 @@ def complaints_about(path):
         elif "decant_report" in file.attrs:
             check_report(check, rows_of(FORMATS / "report-format.md"))
         else:
-            print(f"{path}: neither a fixture nor a report", file=sys.stderr)
-            raise SystemExit(2)
+            kind = next((k for k in ("inputs", "results", "reference") if f"decant_{k}" in file.attrs),
+                        None)
+            if not kind:
+                print(f"{path}: nothing that has a schema document", file=sys.stderr)
+                raise SystemExit(2)
+            check_parts(check, rows_of(FORMATS / "results-format.md"), kind)
         return check.complaints
 
 
