@@ -72,6 +72,9 @@ TEST_F(FixtureResults, WithNothingInThemAreNotRun) {
   const ResultsOutcome outcome = judged();
   EXPECT_EQ(outcome.status, 3);
   EXPECT_NE(outcome.line.find("not_run"), std::string::npos) << outcome.line;
+  const Eigen::Index n = fixture_->state.size();
+  write([&](Hdf5Writer& out) { out.integers("/id", IdVector::LinSpaced(n, 0, n - 1)); });
+  EXPECT_EQ(judged().status, 3) << "ids alone are no answer";
 }
 
 TEST_F(FixtureResults, FailByTheParticleThatIsWrong) {
