@@ -35,8 +35,8 @@ class ForeignPort : public test::ResultsFile {
   }
   static std::filesystem::path inputs_file() { return *folder_ / "inputs.h5"; }
   static int run_port(const std::string& fault) {
-    return python(in_quotes(root + "/tools/numpy_port.py") + " " + in_quotes(inputs_file()) + " --out " +
-                  in_quotes(results_file()) + " --fault " + fault);
+    return python(in_quotes(root + "/tools/numpy_port.py") + " " + in_quotes(inputs_file()) +
+                  " --out " + in_quotes(results_file()) + " --fault " + fault);
   }
 };
 

@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Holds a fixture, a report, or a file for or from a port that is not linked to its schema document.
+"""Holds fixtures, reports, and files for or from a port that is not linked to their documents.
 
     check_schema.py FILE.h5 …
 
-Reads the table in oracle/fixture-format.md, report-format.md or results-format.md and compares names,
-dtypes, shapes and units with what stands in the file. Exit status: 0 as documented, 1 not, 2 bad input.
+Reads the table in oracle/fixture-format.md, report-format.md or results-format.md and compares
+names, dtypes, shapes and units with what stands in the file. Exit status: 0 as documented, 1 not,
+2 bad input.
 """
 
 import json
@@ -171,12 +172,11 @@ def complaints_about(path):
         elif "decant_report" in file.attrs:
             check_report(check, rows_of(FORMATS / "report-format.md"))
         else:
-            kind = next((k for k in ("inputs", "results", "reference") if f"decant_{k}" in file.attrs),
-                        None)
-            if not kind:
+            kinds = [k for k in ("inputs", "results", "reference") if f"decant_{k}" in file.attrs]
+            if not kinds:
                 print(f"{path}: nothing that has a schema document", file=sys.stderr)
                 raise SystemExit(2)
-            check_parts(check, rows_of(FORMATS / "results-format.md"), kind)
+            check_parts(check, rows_of(FORMATS / "results-format.md"), kinds[0])
         return check.complaints
 
 
