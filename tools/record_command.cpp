@@ -75,14 +75,14 @@ ParticleState state_in_frames(const Hdf5Reader& frames, const Scene& scene,
   return state;
 }
 
-/// Anybody's state: /position and /velocity, [N,3], at the substep of the root's attribute, or 0.
-ParticleState plain_state(const Hdf5Reader& reader) {
+/// Anybody's state: /position and /velocity, [N,3], at the root's attribute time (s), or 0.
+ParticleState plain_state(const Hdf5Reader& reader, const Scene& scene) {
   ParticleState state;
   state.position = reader.matrix3("/position");
   state.velocity = reader.matrix3("/velocity", state.position.cols());
-  if (reader.has_attribute("/", "substep")) state.substep = reader.integer_attribute("/", "substep");
-  if (state.substep < 0)
-    throw InputError(reader.file().string(), "substep", std::to_string(state.substep), ">= 0");
+  if (reader.has_attribute("/", "time"))
+    state.substep =
+        parse_phase(scene, fmt::format("state={}", reader.real_attribute("/", "time"))).substep;
   if (!state.position.allFinite() || !state.velocity.allFinite())
     throw InputError(reader.file().string(), "/position and /velocity", "not finite",
                      "finite numbers");
@@ -94,7 +94,7 @@ Start start_of(const RecordArguments& arguments, const Scene& scene) {
   const std::string& file = arguments.from;
   const Hdf5Reader reader(file);
   if (reader.has("/position"))
-    return {plain_state(reader), {},
+    return {plain_state(reader, scene), {},
             std::filesystem::path(file).filename().string() + " " + sha256_of_file(file), {}};
   if (reader.has("/fluid/position")) {
     const auto name = [&](const char* attribute) { return reader.text_attribute("/", attribute); };
@@ -237,7 +237,7 @@ void add_record_command(CLI::App& app, int& exit_status) {
   verb->add_option("--phase", arguments->phases, "NAME or NAME=TIME (s); may be repeated")
       ->allow_extra_args(false);
   verb->add_option("--from", arguments->from, "start from a frames.h5, a checkpoint.h5, a fixture, or any HDF5 file with\n"
-                   "/position and /velocity, [N,3]");
+                   "/position and /velocity, [N,3], and an attribute time");
   verb->add_option("--backend", arguments->backend, "what moves the fluid: reference, brute, …")
       ->capture_default_str();
   verb->add_option("--executor", arguments->executor, "auto, cuda or host")->capture_default_str();

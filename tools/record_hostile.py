@@ -10,21 +10,30 @@ import h5py
 import numpy as np
 
 
-def cup(rng, n):
-    """n points in the cup of hostile-cup.json, at least 0.7 dx apart."""
+def tilted(x):
+    """Points of the upright cup of hostile-cup.json where it stands after 0.2 s, at half its tilt."""
+    axis, angle, pivot = np.array([0.36, 0.8, 0.48]), np.radians(30), np.array([-0.28, -0.2, -0.22])
+    x = x + [-0.3, -0.2, -0.25] - pivot
+    along = x @ axis
+    return (pivot + x * np.cos(angle) + np.cross(axis, x) * np.sin(angle)
+            + np.outer(along, axis) * (1 - np.cos(angle)))
+
+
+def cup(rng, n, reach=0.016, low=0.003, high=0.023):
+    """n points in the tilted cup, at least 0.7 dx apart; inner radius 0.02, bottom at 0."""
     dx, points = 0.004, []
     while len(points) < n:
-        r, angle, z = 0.016 * np.sqrt(rng.random()), 2 * np.pi * rng.random(), 0.003 + 0.02 * rng.random()
-        x = np.array([r * np.cos(angle), r * np.sin(angle), z]) + [-0.3, -0.2, -0.25]
+        r, angle, z = reach * np.sqrt(rng.random()), 2 * np.pi * rng.random(), rng.uniform(low, high)
+        x = np.array([r * np.cos(angle), r * np.sin(angle), z])
         if all(np.sum((x - y) ** 2) > (0.7 * dx) ** 2 for y in points):
             points.append(x)
-    return np.array(points)
+    return tilted(np.array(points))
 
 
 def states(rng):
     """(name, scene, positions): each a way in which a port breaks."""
     yield "empty", "hostile-cup", np.zeros((0, 3))
-    yield "one-particle", "hostile-cup", np.array([[-0.3, -0.2, -0.2405]])
+    yield "one-particle", "hostile-cup", tilted(np.array([[0.0, 0.0, 0.009]]))
 
     twins = cup(rng, 120)
     twins[1], twins[3], twins[4] = twins[0], twins[2], twins[2]
@@ -42,6 +51,9 @@ def states(rng):
     outliers[7], outliers[80] = [49.5, -49.25, 0.9], [-49.9, 49.5, -0.45]
     yield "outliers", "hostile-cup", outliers
 
+    # Some in the solid, some about to touch it, most in the fluid.
+    yield "in-walls", "hostile-cup", cup(rng, 200, reach=0.024, low=-0.003)
+
     # Some three times as dense as water in the middle of a loose fluid.
     crowd = rng.normal(size=(260, 3))
     crowd *= (0.0095 * rng.random((260, 1)) ** (1 / 3)) / np.linalg.norm(crowd, axis=1, keepdims=True)
@@ -49,14 +61,18 @@ def states(rng):
     loose += rng.uniform(-0.001, 0.001, loose.shape)
     middle = np.array([0.03, 0.03, 0.03])
     loose = loose[np.linalg.norm(loose - middle, axis=1) > 0.013]
-    for k in range(72):  # about to touch one of the six faces
-        loose[k, k % 3] = (0.00127, 0.06 - 0.00127)[k % 2]
+    for k in range(72):  # about to touch one of the six faces, or in it
+        loose[k, k % 3] = (0.00127, 0.06 - 0.00127, -0.001, 0.0615)[k % 4]
     yield "crowd", "hostile-tank", np.concatenate([crowd + middle, loose])
 
     spread = np.stack(np.meshgrid(np.arange(10), np.arange(9), np.arange(12)), -1).reshape(-1, 3)
     spread = (spread + 0.5 + rng.uniform(-0.3, 0.3, spread.shape)) * 0.001 + [-0.003, 0, 0]
     spread[1] = spread[0]
     yield "periodic", "hostile-channel", spread
+
+    tumbling = np.stack(np.meshgrid(*[np.arange(8)] * 3), -1).reshape(-1, 3)
+    tumbling = (tumbling + 0.5 + rng.uniform(-0.3, 0.3, tumbling.shape)) * 0.01 - 0.04
+    yield "periodic-box", "hostile-box", tumbling
 
     lattice = np.stack(np.meshgrid(*[np.arange(-4, 4)] * 3), -1).reshape(-1, 3)
     yield "exact-support", "hostile-exact", lattice * 2.0**-8
@@ -76,8 +92,9 @@ def main():
             state = Path(folder) / f"{name}.h5"
             with h5py.File(state, "w", libver="v108") as f:
                 f["position"], f["velocity"] = position, velocity
+                f.attrs["time"] = time = 0.2 if scene == "hostile-cup" else 0.0
             subprocess.run([a.decant, "record", a.fixtures / "scenes" / f"{scene}.json", "--from", state,
-                            "--phase", f"{name}=0", "--out", a.fixtures / f"hostile-{name}.h5", "--quiet"],
+                            "--phase", f"{name}={time}", "--out", a.fixtures / f"hostile-{name}.h5", "--quiet"],
                            check=True)
 
 

@@ -269,6 +269,8 @@ const std::vector<std::pair<std::string, std::string>>& attempts() {
       {"list", "hostile-periodic"},
       {"hash", "hostile-crowd"},
       {"hash", "hostile-coincident"},
+      {"hash", "hostile-in-walls"},
+      {"list", "hostile-periodic-box"},
       {"list:skin=0.05", "pour-4k-splash"},
       {"list:trigger=local:skin=0.05", "pour-4k-splash"},
       {"hash:source=rebuilt:sort=thrust", "pour-4k-stream"},
@@ -292,11 +294,13 @@ int run_mutations(const Settings& s, const nlohmann::json& faults, Executor exec
   std::vector<Trial> used;
   for (const auto& [backend, fixture] : attempts()) used.push_back({0, backend, fixture});
   const auto prepared = prepare_all(used, s.folder);
-  // Most show at once in the fields; only what does not is worth a run.
-  const CheckSelection quick{"fields", "substep"};
+  // Most show at once in the fields; only what does not is worth runs.
   std::vector<std::tuple<std::string, std::string, CheckSelection>> rounds;
-  for (const CheckSelection& checks : {quick, all_checks()})
-    for (const auto& [backend, fixture] : attempts()) rounds.emplace_back(backend, fixture, checks);
+  for (const auto& [backend, fixture] : attempts())
+    rounds.emplace_back(backend, fixture, CheckSelection{"fields", "substep"});
+  for (const auto& [backend, fixture] : attempts())
+    if (fixture.starts_with("hostile-") || backend == "list:skin=0.05")
+      rounds.emplace_back(backend, fixture, all_checks());
   for (const auto& [backend, fixture, checks] : rounds) {
     std::vector<Trial> trials;
     std::vector<std::size_t> which;
