@@ -20,11 +20,6 @@ struct Line {
   const CheckRow* worst = nullptr;
 };
 
-std::string backend_label(const CheckRow& row) {
-  const auto options = row.options.empty() ? "" : "(" + row.options + ")";
-  return row.backend + options + " " + row.executor;
-}
-
 /// A row that fails is worse than one that passes, whatever their scores: some checks fail by
 /// count.
 bool worse(const CheckRow& a, const CheckRow& b) {
@@ -92,16 +87,19 @@ std::string wrapped(const std::string& text, std::size_t indent) {
   return out;
 }
 
-namespace {
+std::string backend_label(const CheckRow& row) {
+  const auto options = row.options.empty() ? "" : "(" + row.options + ")";
+  return row.backend + options + " " + row.executor;
+}
 
-std::string check_name(const CheckRow& row) {
+std::string check_label(const CheckRow& row) {
   return row.check == row.field || row.field.empty() ? row.check : row.check + " / " + row.field;
 }
 
 std::string in_full(const CheckRow& row) {
   const Verdict verdict = judged_verdict(row);
   std::string text = wrapped(fmt::format("{}: {} on {}: {}", to_string(verdict), backend_label(row),
-                                         row.fixture, check_name(row)),
+                                         row.fixture, check_label(row)),
                              0);
   if (verdict == Verdict::fail && row.n > 0) {
     const auto unit = row.unit.empty() || row.unit == "1" ? "" : " " + row.unit;
@@ -117,6 +115,8 @@ std::string in_full(const CheckRow& row) {
   }
   return text + wrapped(judged_reason(row), 4);
 }
+
+namespace {
 
 std::string counted(std::size_t n, const std::string& what) {
   return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s");
@@ -164,7 +164,7 @@ std::string console_table(const Report& report) {
                         backend_width, fitted(line.fixture, fixture_width), fixture_width,
                         to_string(line.verdict),
                         line.worst ? fmt::format("{:.3g}", line.worst->score) : "-",
-                        line.worst ? fitted(check_name(*line.worst), check_width) : "-");
+                        line.worst ? fitted(check_label(*line.worst), check_width) : "-");
   std::string rest;
   for (const auto& row : report.rows)
     if (judged_verdict(row) != Verdict::pass) rest += in_full(row);

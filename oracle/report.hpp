@@ -79,6 +79,15 @@ Report read_report(const std::filesystem::path& file);
 /// at most 100 columns.
 std::string console_table(const Report& report);
 
+/// Backend, its options and its executor as tables name them: "hash(sort=thrust) cuda".
+std::string backend_label(const CheckRow& row);
+
+/// "substep / velocity"; the check alone where the field has its name.
+std::string check_label(const CheckRow& row);
+
+/// One row as the table tells it below itself: verdict, place, figures, reason; several lines.
+std::string in_full(const CheckRow& row);
+
 /// Text broken at spaces, every line after the indent, none wider than the table.
 std::string wrapped(const std::string& text, std::size_t indent);
 

@@ -6,7 +6,9 @@
 #include "tools/backend_choice.hpp"
 #include "tools/build_provenance.hpp"
 #include "tools/commands.hpp"
+#include "tools/csv_writer.hpp"
 #include "tools/fixture_folder.hpp"
+#include "tools/junit.hpp"
 #include "tools/output_place.hpp"
 #include "tools/progress.hpp"
 #include "tools/results_judgement.hpp"
@@ -26,7 +28,7 @@ namespace {
 struct ConformArguments {
   BackendFlags flags;
   std::vector<std::string> fixtures, backends, checks;
-  std::string executor = "auto", report, explain;
+  std::string executor = "auto", report, junit, explain;
   std::string results, oracle, name;
   bool all = false, json = false, quiet = false;
 };
@@ -212,6 +214,7 @@ int hand_over(const ConformArguments& arguments, const Report& report, int statu
   std::fflush(stdout);
   // After the table: what was found out is not lost with a full disk.
   if (!arguments.report.empty()) write_report(arguments.report, report);
+  if (!arguments.junit.empty()) write_text_file(arguments.junit, junit_xml(report));
   return status;
 }
 
@@ -236,6 +239,7 @@ int conform(ConformArguments& arguments) {
   const CheckSelection checks =
       arguments.checks.empty() ? all_checks() : parse_checks(arguments.checks);
   check_output_place("--report", arguments.report);
+  check_output_place("--junit", arguments.junit);
   auto candidates = candidates_of(arguments);
   const auto fixtures = fixtures_of(arguments);
   const bool talks = !arguments.quiet && !arguments.json;
@@ -275,6 +279,7 @@ void add_conform_command(CLI::App& app, int& exit_status) {
                    "their own reference, for --results of their own states");
   verb->add_option("--name", arguments->name, "what the report calls --results; default: its file");
   verb->add_option("--report", arguments->report, "write an HDF5 report");
+  verb->add_option("--junit", arguments->junit, "write JUnit XML, for CI");
   verb->add_flag("--json", arguments->json, "rows as JSON instead of the table");
   verb->add_flag("--quiet", arguments->quiet, "the verdict's line alone");
   verb->callback([arguments, &exit_status] { exit_status = conform(*arguments); });
