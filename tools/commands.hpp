@@ -26,6 +26,9 @@ void add_info_command(CLI::App& app, int& exit_status);
 /// `decant conform`: the conformance suite.
 void add_conform_command(CLI::App& app, int& exit_status);
 
+/// `decant diff`: what changed between two reports. Exit status 1 where a verdict got worse.
+void add_diff_command(CLI::App& app, int& exit_status);
+
 /// `decant bench`: what a substep costs.
 void add_bench_command(CLI::App& app, int& exit_status);
 

@@ -18,6 +18,7 @@ constexpr const char* footer =
     "Examples:\n"
     "  decant pour fixtures/scenes/pour-4k.json --out build/pour-4k\n"
     "  decant conform --backend brute --report build/report.h5\n"
+    "  decant diff before.h5 build/report.h5\n"
     "  decant record fixtures/scenes/pour-4k.json --out pour-4k-stream.h5\n"
     "  decant info\n"
     "\n"
@@ -42,6 +43,7 @@ int main(int argc, char** argv) {
   add_record_command(app, status);
   add_conform_command(app, status);
   add_export_command(app, status);
+  add_diff_command(app, status);
   add_bench_command(app, status);
   add_info_command(app, status);
   try {
