@@ -52,7 +52,10 @@ void compare(const Values& v, CheckRow& row) {
       worst = score;
       row.value = row.error[k];
       row.tolerance = v.tolerance[k];
+      row.got = v.got[k];
+      row.expected = v.expected[k];
       row.worst_id = static_cast<std::int64_t>(particle);
+      row.worst_component = v.components > 1 ? k % v.components : -1;
     }
     if (v.float_value.size())
       float_worst = std::max(

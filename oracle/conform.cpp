@@ -5,6 +5,7 @@
 #include "oracle/comparison.hpp"
 #include "oracle/field_checks.hpp"
 #include "oracle/run_checks.hpp"
+#include "oracle/surroundings.hpp"
 #include "reference/error.hpp"
 #include "reference/sampling.hpp"
 #include "reference/solver.hpp"
@@ -176,7 +177,9 @@ std::vector<CheckRow> judge(Backend& backend, const Fixture& fixture, const Judg
     if (!sheet) sheet.emplace(BackendInfo{}, fixture.name);  // it cannot even say what it is
     sheet->failed("run", error.what());
   }
-  return sheet->take();
+  std::vector<CheckRow> rows = sheet->take();
+  locate(fixture, oracle.walls, rows);
+  return rows;
 }
 
 }  // namespace decant

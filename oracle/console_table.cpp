@@ -54,6 +54,28 @@ std::vector<Line> lines_of(const std::vector<CheckRow>& rows) {
   return lines;
 }
 
+std::string unit_of(const CheckRow& row) {
+  return row.unit.empty() || row.unit == "1" ? "" : " " + row.unit;
+}
+
+/// The values themselves, and where; empty where the row knows neither.
+std::string details(const CheckRow& row) {
+  std::string text;
+  if (!std::isnan(row.expected)) {
+    const char* components[] = {"x: ", "y: ", "z: "};
+    const bool component = row.worst_component >= 0 && row.worst_component < 3;
+    text += fmt::format("{}got {:.9g}, expected {:.9g}{}",
+                        component ? components[row.worst_component] : "", row.got, row.expected,
+                        unit_of(row));
+  }
+  if (std::isnan(row.worst_x)) return text;
+  if (!text.empty()) text += "; ";
+  text += fmt::format("at ({:.6g}, {:.6g}, {:.6g}) m; {} fluid neighbors", row.worst_x,
+                      row.worst_y, row.worst_z, row.fluid_neighbors);
+  if (!row.nearest.empty()) text += ", nearest " + row.nearest;
+  return text + fmt::format("; {} wall neighbors", row.wall_neighbors);
+}
+
 /// Shortened in the middle to `width` bytes; the end of a name tells more than its middle.
 std::string fitted(const std::string& text, std::size_t width) {
   if (text.size() <= width) return text;
@@ -102,16 +124,19 @@ std::string in_full(const CheckRow& row) {
                                          row.fixture, check_label(row)),
                              0);
   if (verdict == Verdict::fail && row.n > 0) {
-    const auto unit = row.unit.empty() || row.unit == "1" ? "" : " " + row.unit;
+    const std::string unit = unit_of(row);
     std::string figures = fmt::format("error {:.4g}{}, tolerance {:.4g}{}, score {:.3g}", row.value,
                                       unit, row.tolerance, unit, row.score);
-    if (row.worst_id >= 0) figures = fmt::format("particle {}: ", row.worst_id) + figures;
+    if (row.worst_id >= 0)
+      figures = fmt::format("{}particle {}: ", row.field == "boundary_volume" ? "wall " : "",
+                            row.worst_id) +
+                figures;
     figures += fmt::format("; median score {:.3g}", row.median_score);
     if (!std::isnan(row.float_score))
       figures += fmt::format("; sequential fp32 scores {:.3g}", row.float_score);
     figures += fmt::format("; {} compared", row.n);
     if (row.excluded > 0) figures += fmt::format(", {} ambiguous left out", row.excluded);
-    text += wrapped(figures, 4);
+    text += wrapped(figures, 4) + wrapped(details(row), 4);
   }
   return text + wrapped(judged_reason(row), 4);
 }

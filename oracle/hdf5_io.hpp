@@ -114,6 +114,11 @@ class Hdf5Writer {
   void attribute(const std::string& object, const std::string& name, const char* text) {
     attribute(object, name, std::string_view(text));
   }
+  /// [n] int64.
+  void attribute(const std::string& object, const std::string& name,
+                 const std::vector<std::int64_t>& values);
+  /// Fixed-length ASCII, which some readers insist on.
+  void ascii_attribute(const std::string& object, const std::string& name, std::string_view text);
   /// Writes to the disk and renames into place; the last call on a writer.
   void commit();
 

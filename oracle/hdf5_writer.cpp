@@ -177,11 +177,12 @@ void Hdf5Writer::group(const std::string& path) {
 
 namespace {
 
-/// Writes one scalar attribute of what stands at a path; false where HDF5 refuses.
+/// Writes one attribute of what stands at a path, a scalar where no length is given; false where
+/// HDF5 refuses.
 bool write_attribute(hid_t file, const std::string& object, const std::string& name, hid_t type,
-                     hid_t memory, const void* value) {
+                     hid_t memory, const void* value, hsize_t length = 0) {
   const Handle owner(H5Oopen(file, object.c_str(), H5P_DEFAULT));
-  const Handle space(H5Screate(H5S_SCALAR));
+  const Handle space(length > 0 ? H5Screate_simple(1, &length, nullptr) : H5Screate(H5S_SCALAR));
   if (!owner) return false;
   const Handle attribute(
       H5Acreate2(owner.get(), name.c_str(), type, space.get(), H5P_DEFAULT, H5P_DEFAULT));
@@ -209,6 +210,24 @@ void Hdf5Writer::attribute(const std::string& object, const std::string& name, d
 void Hdf5Writer::attribute(const std::string& object, const std::string& name, std::int64_t value) {
   group(object);
   if (!write_attribute(id_, object, name, H5T_STD_I64LE, H5T_NATIVE_INT64, &value))
+    fail(object + "@" + name, hdf5_message());
+}
+
+void Hdf5Writer::attribute(const std::string& object, const std::string& name,
+                           const std::vector<std::int64_t>& values) {
+  group(object);
+  if (!write_attribute(id_, object, name, H5T_STD_I64LE, H5T_NATIVE_INT64, values.data(),
+                       values.size()))
+    fail(object + "@" + name, hdf5_message());
+}
+
+void Hdf5Writer::ascii_attribute(const std::string& object, const std::string& name,
+                                 std::string_view text) {
+  const Handle type(H5Tcopy(H5T_C_S1));
+  H5Tset_size(type.get(), text.size());
+  H5Tset_strpad(type.get(), H5T_STR_NULLPAD);
+  group(object);
+  if (!write_attribute(id_, object, name, type.get(), type.get(), text.data()))
     fail(object + "@" + name, hdf5_message());
 }
 

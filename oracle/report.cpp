@@ -3,6 +3,7 @@
 #include "oracle/report.hpp"
 
 #include "oracle/hdf5_io.hpp"
+#include "oracle/vtkhdf.hpp"
 #include "reference/error.hpp"
 
 #include <fmt/format.h>
@@ -14,8 +15,6 @@
 
 namespace decant {
 namespace {
-
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 // Bytes that whole arrays may take in a report, and then how many rows keep how many worst values:
 // with the summary of some thousand rows the file stays below 15 MB.
@@ -44,7 +43,7 @@ std::vector<double> quantiles_of(const CheckRow& row) {
   if (!has_arrays(row))
     return row.score_quantiles.size() == quantile_percent.size()
                ? row.score_quantiles
-               : std::vector<double>(quantile_percent.size(), nan);
+               : std::vector<double>(quantile_percent.size(), no_number);
   Eigen::VectorXd scores = scores_of(row);
   std::sort(scores.begin(), scores.end());
   std::vector<double> q;
@@ -57,7 +56,7 @@ using TextColumn = std::string CheckRow::*;
 using IntegerColumn = std::int64_t CheckRow::*;
 using RealColumn = double CheckRow::*;
 
-constexpr std::array<std::pair<const char*, TextColumn>, 9> text_columns = {{
+constexpr std::array<std::pair<const char*, TextColumn>, 10> text_columns = {{
     {"backend", &CheckRow::backend},
     {"options", &CheckRow::options},
     {"executor", &CheckRow::executor},
@@ -67,18 +66,32 @@ constexpr std::array<std::pair<const char*, TextColumn>, 9> text_columns = {{
     {"field", &CheckRow::field},
     {"unit", &CheckRow::unit},
     {"reason", &CheckRow::reason},
+    {"nearest", &CheckRow::nearest},
 }};
-constexpr std::array<std::pair<const char*, IntegerColumn>, 3> integer_columns = {{
+constexpr std::array<std::pair<const char*, IntegerColumn>, 6> integer_columns = {{
     {"n", &CheckRow::n},
     {"worst_id", &CheckRow::worst_id},
+    {"worst_component", &CheckRow::worst_component},
     {"excluded", &CheckRow::excluded},
+    {"fluid_neighbors", &CheckRow::fluid_neighbors},
+    {"wall_neighbors", &CheckRow::wall_neighbors},
 }};
-constexpr std::array<std::pair<const char*, RealColumn>, 5> real_columns = {{
-    {"value", &CheckRow::value},
-    {"tolerance", &CheckRow::tolerance},
-    {"score", &CheckRow::score},
-    {"median_score", &CheckRow::median_score},
-    {"float_score", &CheckRow::float_score},
+struct Reals {
+  const char* name;
+  RealColumn member;
+  const char* unit;  // empty: the row's, or none
+};
+constexpr std::array<Reals, 10> real_columns = {{
+    {"value", &CheckRow::value, ""},
+    {"tolerance", &CheckRow::tolerance, ""},
+    {"score", &CheckRow::score, ""},
+    {"median_score", &CheckRow::median_score, ""},
+    {"float_score", &CheckRow::float_score, ""},
+    {"got", &CheckRow::got, ""},
+    {"expected", &CheckRow::expected, ""},
+    {"worst_x", &CheckRow::worst_x, "m"},
+    {"worst_y", &CheckRow::worst_y, "m"},
+    {"worst_z", &CheckRow::worst_z, "m"},
 }};
 
 Eigen::VectorXd real_column(const std::vector<CheckRow>& rows, RealColumn member) {
@@ -104,8 +117,8 @@ void write_summary(Hdf5Writer& out, const std::vector<CheckRow>& rows) {
       values[static_cast<Eigen::Index>(k)] = rows[k].*member;
     out.integers(std::string("/summary/") + name, values);
   }
-  for (const auto& [name, member] : real_columns)
-    out.vector(std::string("/summary/") + name, real_column(rows, member), {});
+  for (const auto& [name, member, unit] : real_columns)
+    out.vector(std::string("/summary/") + name, real_column(rows, member), unit);
 
   std::vector<Eigen::VectorXd> quantiles(quantile_percent.size(),
                                          Eigen::VectorXd(static_cast<Eigen::Index>(rows.size())));
@@ -209,6 +222,7 @@ void write_report(const std::filesystem::path& file, const Report& report) {
   out.attribute("/", "verdict", status == 0 ? "pass" : status == 1 ? "fail" : "not_run");
   write_summary(out, rows);
   write_checks(out, rows);
+  if (report.surroundings) write_vtkhdf(out, *report.surroundings);
   out.group("/provenance");
   for (const auto& [name, text] : report.provenance) out.attribute("/provenance", name, text);
   out.commit();
@@ -232,7 +246,7 @@ Report read_report(const std::filesystem::path& file) {
     for (Eigen::Index k = 0; k < n; ++k)
       report.rows[static_cast<std::size_t>(k)].*member = values[k];
   }
-  for (const auto& [name, member] : real_columns) {
+  for (const auto& [name, member, unit] : real_columns) {
     const Eigen::VectorXd values = in.vector(std::string("/summary/") + name, n);
     for (Eigen::Index k = 0; k < n; ++k)
       report.rows[static_cast<std::size_t>(k)].*member = values[k];

@@ -11,7 +11,9 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,6 +22,8 @@ namespace decant {
 enum class Verdict : std::uint8_t { pass, fail, not_run };
 /// "pass", "fail" or "not_run".
 const char* to_string(Verdict verdict);
+
+inline constexpr double no_number = std::numeric_limits<double>::quiet_NaN();
 
 /// One line of /summary: one field of one check of one backend on one fixture.
 struct CheckRow {
@@ -34,7 +38,15 @@ struct CheckRow {
   double score = 0;      // max |error| / tolerance; passes where score <= 1
   double median_score = 0;
   double float_score = 0;  // score of the oracle's source in sequential fp32; NaN where none
-  std::int64_t worst_id = -1;
+  std::int64_t worst_id = -1;  // a wall particle's where the field is boundary_volume
+  std::int64_t worst_component = -1;  // 0, 1, 2 of a vector
+  /// The worst value and the oracle's, in `unit`; `expected` is no number where a row has none.
+  double got = no_number, expected = no_number;
+  /// Where the worst particle is in the fixture, m, and who is nearer than H: filled by `locate`
+  /// (surroundings.hpp) for rows that fail at a particle.
+  double worst_x = no_number, worst_y = no_number, worst_z = no_number;
+  std::int64_t fluid_neighbors = -1, wall_neighbors = -1;
+  std::string nearest;  // ids of the eight nearest fluid neighbors at most, nearest first
   std::int64_t excluded = 0;  // ambiguous particles left out, by name and within a bound
   Verdict verdict = Verdict::not_run;
   std::string reason;  // why not_run or fail; empty on a pass
@@ -51,13 +63,26 @@ inline constexpr std::array<int, 9> quantile_percent = {0, 1, 5, 25, 50, 75, 95,
 /// that a long run does not hold what no report will keep.
 void condense(CheckRow& row);
 
+/// Fluid and wall particles around the worst particle of one row, as points to look at.
+struct Surroundings {
+  std::int64_t row = -1;  // in the summary
+  double spacing = 0, support_radius = 0;  // m
+  Eigen::Matrix3Xd position;               // 3×P, m, fluid first
+  Eigen::Matrix<std::int64_t, Eigen::Dynamic, 1> id;  // P, of the fluid or of the walls
+  std::vector<std::uint8_t> wall;                     // P, 1 for wall particles
+  Eigen::VectorXd density;  // P, the oracle's, kg/m³; no number for walls
+  /// P, of the row's field, where a vector's component scores most; no number where none.
+  Eigen::VectorXd error, tolerance, score;
+};
+
 struct Report {
   std::vector<CheckRow> rows;
   std::map<std::string, std::string> provenance;
+  std::optional<Surroundings> surroundings = std::nullopt;
 };
 
 /// Schema version of report files; a reader refuses any other.
-inline constexpr std::int64_t report_schema = 1;
+inline constexpr std::int64_t report_schema = 2;
 
 /// The verdict as every consumer must read it: a pass stands only where 0 <= score <= 1 and value
 /// and tolerance are numbers, otherwise it is a fail.
@@ -67,11 +92,12 @@ Verdict judged_verdict(const CheckRow& row);
 std::string judged_reason(const CheckRow& row);
 
 /// Writes the report whole or not at all, below 15 MB: once failing checks have filled 8 MB, later
-/// ones keep their worst values, and then their quantiles alone. Throws std::runtime_error naming
-/// the file where writing fails.
+/// ones keep their worst values, and then their quantiles alone. ParaView opens it where it has
+/// surroundings. Throws std::runtime_error naming the file where writing fails.
 void write_report(const std::filesystem::path& file, const Report& report);
 
-/// Rows and provenance of a report, without the arrays. Throws InputError naming file and dataset.
+/// Rows and provenance of a report, without arrays and surroundings. Throws InputError naming file and
+/// dataset.
 Report read_report(const std::filesystem::path& file);
 
 /// Table of backend × fixture: verdict, worst score, the check it came from; then every row that

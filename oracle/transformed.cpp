@@ -10,19 +10,24 @@
 namespace decant {
 namespace {
 
+std::vector<Eigen::Index> ids_of(const ParticleState& state) {
+  std::vector<Eigen::Index> ids(static_cast<std::size_t>(state.size()));
+  std::iota(ids.begin(), ids.end(), Eigen::Index{0});
+  return ids;
+}
+
 TransformedProblem permuted(const Scene& scene, const ParticleState& state, unsigned seed) {
-  std::vector<Eigen::Index> order(static_cast<std::size_t>(state.size()));
-  std::iota(order.begin(), order.end(), Eigen::Index{0});
+  std::vector<Eigen::Index> order = ids_of(state);
   std::mt19937 random(seed);
   std::shuffle(order.begin(), order.end(), random);
-  TransformedProblem p{"permuted", scene, state};
+  TransformedProblem p{"permuted", scene, state, order};
   p.state.position = state.position(Eigen::all, order);
   p.state.velocity = state.velocity(Eigen::all, order);
   return p;
 }
 
 TransformedProblem moved(const Scene& scene, const ParticleState& state, const Vec3& by) {
-  TransformedProblem p{"moved", scene, state};
+  TransformedProblem p{"moved", scene, state, ids_of(state)};
   p.scene.domain.min += by;
   p.scene.domain.max += by;
   if (p.scene.floor) p.scene.floor->height += by.z();
@@ -43,7 +48,7 @@ SolidBox turned(const SolidBox& box) {
 }
 
 TransformedProblem turned(const Scene& scene, const ParticleState& state) {
-  TransformedProblem p{"turned", scene, state};
+  TransformedProblem p{"turned", scene, state, ids_of(state)};
   const SolidBox domain = turned(SolidBox{scene.domain.min, scene.domain.max});
   p.scene.domain.min = domain.min;
   p.scene.domain.max = domain.max;

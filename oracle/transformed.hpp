@@ -15,6 +15,7 @@ struct TransformedProblem {
   std::string name;  // "permuted", "moved", "turned"
   Scene scene;
   ParticleState state;  // fp32-representable
+  std::vector<Eigen::Index> original;  // N, whose id each particle had
 };
 
 /// Ids in an order drawn from `seed`; moved by half a meter along every axis, then rounded to fp32;

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <limits>
 #include <sstream>
@@ -74,9 +75,9 @@ TEST_F(ReportFile, TheSummarysColumnsAreOfEqualLength) {
   for (int k = 0; k < 7; ++k) report.rows.push_back(row("brute", "pour", "density", 0.1 * k));
   write_report(file_, report);
   const Hdf5Reader in(file_);
-  EXPECT_EQ(in.integer_attribute("/", "decant_report"), 1);
+  EXPECT_EQ(in.integer_attribute("/", "decant_report"), 2);
   const auto columns = in.children("/summary");
-  EXPECT_EQ(columns.size(), 9u + 1 + 3 + 5 + 9);
+  EXPECT_EQ(columns.size(), 10u + 1 + 6 + 10 + 9);
   for (const auto& column : columns)
     EXPECT_EQ(in.shape("/summary/" + column), std::vector<std::int64_t>{7}) << column;
 }
@@ -86,6 +87,12 @@ TEST_F(ReportFile, RowsAndProvenanceComeBack) {
   report.rows = {row("brute", "pour-4k-stream", "density", 0.25), row("hash", "α", "pressure", 30),
                  not_run("list", "pour")};
   report.rows[0].excluded = 3;
+  report.rows[1].got = 1001;
+  report.rows[1].expected = 1000;
+  report.rows[1].worst_component = 2;
+  report.rows[1].worst_x = 0.5;
+  report.rows[1].wall_neighbors = 40;
+  report.rows[1].nearest = "4 8 1";
   report.provenance = {{"version", "0.1.0"}, {"compiler", "g++ 12"}};
   write_report(file_, report);
   const Report back = read_report(file_);
@@ -98,6 +105,8 @@ TEST_F(ReportFile, RowsAndProvenanceComeBack) {
   EXPECT_EQ(back.rows[1].verdict, Verdict::fail);
   EXPECT_EQ(back.rows[1].reason, "score above 1");
   EXPECT_EQ(back.rows[2].verdict, Verdict::not_run);
+  EXPECT_TRUE(std::isnan(back.rows[0].expected));
+  EXPECT_EQ(in_full(back.rows[1]), in_full(report.rows[1]));
   EXPECT_EQ(back.provenance, report.provenance);
 }
 
@@ -156,6 +165,31 @@ TEST_F(ReportFile, StaysBelowFifteenMegabytesHoweverMuchFails) {
   EXPECT_EQ(in.integers("/checks/000029/index", 256)[0], 84000);
   EXPECT_EQ(in.vector("/checks/000029/error")[0], static_cast<float>(large.value));
   EXPECT_EQ(in.shape("/summary/score"), std::vector<std::int64_t>{3030});
+}
+
+/// What VTK's reader asks of PolyData: every group of cells, an offset more than cells.
+TEST_F(ReportFile, SurroundingsAreVertices) {
+  Report report{{row("brute", "pour", "density", 31)}, {}};
+  Surroundings& s = report.surroundings.emplace();
+  s.row = 0;
+  s.position = Eigen::Matrix3Xd::Random(3, 5);
+  s.id = IdVector::LinSpaced(5, 10, 14);
+  s.wall = {0, 0, 0, 1, 1};
+  s.density = s.error = s.tolerance = s.score = Eigen::VectorXd::Constant(5, 2.0);
+  write_report(file_, report);
+  EXPECT_FALSE(read_report(file_).surroundings);
+  const Hdf5Reader in(file_);
+  EXPECT_EQ(in.text_attribute("/VTKHDF", "Type"), "PolyData");
+  EXPECT_EQ(in.integers("/VTKHDF/NumberOfPoints", 1)[0], 5);
+  EXPECT_TRUE(in.matrix3("/VTKHDF/Points", 5).isApprox(s.position, 1e-6));
+  EXPECT_EQ(in.integers("/VTKHDF/PointData/id", 5), s.id);
+  EXPECT_EQ(in.integers("/VTKHDF/Vertices/Offsets", 6)[5], 5);
+  for (const char* kind : {"Lines", "Polygons", "Strips"}) {
+    const std::string group = std::string("/VTKHDF/") + kind;
+    EXPECT_EQ(in.integers(group + "/NumberOfCells", 1)[0], 0);
+    EXPECT_EQ(in.integers(group + "/Offsets", 1)[0], 0);
+    EXPECT_EQ(in.integers(group + "/Connectivity", 0).size(), 0);
+  }
 }
 
 TEST_F(ReportFile, ADamagedReportIsRefusedByName) {

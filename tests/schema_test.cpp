@@ -1,11 +1,11 @@
 /// \file
 /// Fixtures and reports are what their documents say, as h5py sees them.
 #include "oracle/report.hpp"
+#include "tests/python.hpp"
 #include "tests/small_fixture.hpp"
 
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <filesystem>
 
 namespace decant {
@@ -13,20 +13,15 @@ namespace {
 
 /// Exit status of tools/check_schema.py on a file; its output goes to the test's.
 int checked(const std::filesystem::path& file) {
-  const std::string root = DECANT_SOURCE_DIR;
-  const std::string command = "'" + root + "/build/venv/bin/python' '" + root +
-                              "/tools/check_schema.py' '" + file.string() + "'";
-  const int status = std::system(command.c_str());
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  return test::run_python("'" DECANT_SOURCE_DIR "/tools/check_schema.py' '" + file.string() + "'");
 }
 
 class Schema : public FixtureFile {
  protected:
   void SetUp() override {
     FixtureFile::SetUp();
-    const std::string python = std::string(DECANT_SOURCE_DIR) + "/build/venv/bin/python";
-    if (std::system(("'" + python + "' -c 'import h5py' 2>/dev/null").c_str()) != 0)
-      GTEST_SKIP() << "no h5py in " << python << "; ci/setup makes it";
+    if (!test::python_has("h5py"))
+      GTEST_SKIP() << "no h5py in " << test::python() << "; ci/setup makes it";
   }
 };
 
@@ -56,6 +51,22 @@ TEST_F(Schema, AReportIsAsDocumented) {
   EXPECT_EQ(checked(file_), 0);
   write_report(file_, {});
   EXPECT_EQ(checked(file_), 0);
+}
+
+TEST_F(Schema, AReportWithSurroundingsIsAsDocumented) {
+  Report report;
+  Surroundings& s = report.surroundings.emplace();
+  s.position = Eigen::Matrix3Xd::Random(3, 5);
+  s.id = IdVector::LinSpaced(5, 10, 14);
+  s.wall = {0, 0, 0, 1, 1};
+  s.density = s.error = s.tolerance = s.score = Eigen::VectorXd::Constant(5, 2.0);
+  write_report(file_, report);
+  EXPECT_EQ(checked(file_), 0);
+  remove("/VTKHDF/PointData/score");
+  EXPECT_EQ(checked(file_), 1);
+  write_report(file_, report);
+  remove_attribute("/VTKHDF", "Version");
+  EXPECT_EQ(checked(file_), 1);
 }
 
 TEST_F(Schema, WhatIsNotAsDocumentedIsFound) {

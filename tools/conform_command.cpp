@@ -2,6 +2,7 @@
 /// `decant conform`: every asked-for backend on every asked-for fixture, a table, a report, a
 /// status.
 #include "oracle/conform.hpp"
+#include "oracle/surroundings.hpp"
 #include "reference/error.hpp"
 #include "tools/backend_choice.hpp"
 #include "tools/build_provenance.hpp"
@@ -11,6 +12,8 @@
 #include "tools/junit.hpp"
 #include "tools/output_place.hpp"
 #include "tools/progress.hpp"
+#include "tools/recording.hpp"
+#include "tools/replay.hpp"
 #include "tools/results_judgement.hpp"
 
 #include <fmt/format.h>
@@ -28,10 +31,13 @@ namespace {
 struct ConformArguments {
   BackendFlags flags;
   std::vector<std::string> fixtures, backends, checks;
-  std::string executor = "auto", report, junit, explain;
+  std::string executor = "auto", report, junit, surroundings, explain;
   std::string results, oracle, name;
   bool all = false, json = false, quiet = false;
 };
+
+// Of what a report shows around its first failing particle, in H.
+constexpr double shown_radius = 6;
 
 constexpr const char* footer =
     "Without FIXTURE the small recordings beside the binary are judged (or those in the folder "
@@ -134,6 +140,11 @@ Report judge_all(std::vector<Candidate>& candidates, const std::vector<Fixture>&
       }
       for (CheckRow& row : judge(*candidate.backend, fixture, *oracle, checks)) {
         condense(row);
+        if (!report.surroundings && is_located(row))
+          report.surroundings = surroundings_of(
+              fixture, oracle->walls, oracle->own.fields.density, row,
+              static_cast<std::int64_t>(report.rows.size()),
+              shown_radius * fixture.scene.support_radius());
         report.rows.push_back(std::move(row));
       }
     }
@@ -162,8 +173,9 @@ int status_of(const Report& report, const std::vector<Candidate>& candidates) {
   return status == exit_failure && absent && only_the_device ? exit_device_absent : status;
 }
 
-std::string json_text(const Report& report, const std::string& line, int status) {
-  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+std::string json_text(const Report& report, const std::vector<Replay>& replays,
+                      const std::string& line, int status) {
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array(), files = rows;
   for (const auto& r : report.rows)
     rows.push_back({{"backend", r.backend},
                     {"options", r.options},
@@ -180,12 +192,22 @@ std::string json_text(const Report& report, const std::string& line, int status)
                     {"median_score", r.median_score},
                     {"float_score", r.float_score},
                     {"worst_id", r.worst_id},
+                    {"worst_component", r.worst_component},
+                    {"got", r.got},
+                    {"expected", r.expected},
+                    {"worst_position", {r.worst_x, r.worst_y, r.worst_z}},
+                    {"fluid_neighbors", r.fluid_neighbors},
+                    {"wall_neighbors", r.wall_neighbors},
+                    {"nearest", r.nearest},
                     {"excluded", r.excluded},
                     {"verdict", to_string(judged_verdict(r))},
                     {"reason", judged_reason(r)}});
+  for (const auto& replay : replays)
+    files.push_back({{"row", replay.row}, {"file", replay.file.string()}});
   const nlohmann::ordered_json all = {{"summary", line},
                                       {"exit_status", status},
                                       {"rows", rows},
+                                      {"surroundings", files},
                                       {"provenance", report.provenance}};
   return all.dump(2);
 }
@@ -202,11 +224,27 @@ int explain(const std::string& name) {
   return exit_pass;
 }
 
+void write_replays(const std::vector<Replay>& replays, const Report& report,
+                   const std::vector<Fixture>& fixtures, bool talks) {
+  for (const Replay& replay : replays) {
+    const CheckRow& row = report.rows[replay.row];
+    const auto fixture = std::find_if(fixtures.begin(), fixtures.end(),
+                                      [&](const Fixture& f) { return f.name == row.fixture; });
+    std::filesystem::create_directories(replay.file.parent_path());
+    std::string warning;
+    const std::string line = write_replay(replay.file, *fixture, row, warning);
+    if (talks) fmt::print("{}\n", line);
+    if (!warning.empty())
+      fmt::print(stderr, "warning: {}: {}\n", replay.file.string(), warning);
+  }
+}
+
 /// Prints what was asked for and writes the report.
-int hand_over(const ConformArguments& arguments, const Report& report, int status,
-              const std::string& table, const std::string& line) {
+int hand_over(const ConformArguments& arguments, const Report& report,
+              const std::vector<Replay>& replays, int status, const std::string& table,
+              const std::string& line) {
   if (arguments.json)
-    fmt::print("{}\n", json_text(report, line, status));
+    fmt::print("{}\n", json_text(report, replays, line, status));
   else if (arguments.quiet)
     fmt::print("{}\n", line);
   else
@@ -224,12 +262,14 @@ int conform_results(const ConformArguments& arguments) {
   if (!arguments.backends.empty() || arguments.all || arguments.executor != "auto")
     throw InputError("command line", "--results", arguments.results,
                      "instead of --backend, --executor and --all: nothing is run");
+  if (!arguments.surroundings.empty())
+    throw InputError("command line", "--surroundings", arguments.surroundings, "not with --results");
   arguments.flags.require_used();
   check_output_place("--report", arguments.report);
   const ResultsOutcome outcome =
       judge_results_file({arguments.results, arguments.fixtures, arguments.oracle, arguments.name,
                           arguments.checks});
-  return hand_over(arguments, outcome.report, outcome.status, outcome.table, outcome.line);
+  return hand_over(arguments, outcome.report, {}, outcome.status, outcome.table, outcome.line);
 }
 
 int conform(ConformArguments& arguments) {
@@ -240,6 +280,7 @@ int conform(ConformArguments& arguments) {
       arguments.checks.empty() ? all_checks() : parse_checks(arguments.checks);
   check_output_place("--report", arguments.report);
   check_output_place("--junit", arguments.junit);
+  check_output_folder("--surroundings", arguments.surroundings);
   auto candidates = candidates_of(arguments);
   const auto fixtures = fixtures_of(arguments);
   const bool talks = !arguments.quiet && !arguments.json;
@@ -252,7 +293,11 @@ int conform(ConformArguments& arguments) {
   Report report = judge_all(candidates, fixtures, checks, !talks);
   add_provenance(report, candidates, fixtures);
   const int status = status_of(report, candidates);
-  return hand_over(arguments, report, status, "\n" + console_table(report), verdict_line(report));
+  std::vector<Replay> replays;
+  if (!arguments.surroundings.empty()) replays = replays_of(report, arguments.surroundings);
+  hand_over(arguments, report, replays, status, "\n" + console_table(report), verdict_line(report));
+  write_replays(replays, report, fixtures, talks);
+  return status;
 }
 
 }  // namespace
@@ -280,6 +325,8 @@ void add_conform_command(CLI::App& app, int& exit_status) {
   verb->add_option("--name", arguments->name, "what the report calls --results; default: its file");
   verb->add_option("--report", arguments->report, "write an HDF5 report");
   verb->add_option("--junit", arguments->junit, "write JUnit XML, for CI");
+  verb->add_option("--surroundings", arguments->surroundings,
+                   "folder for fixtures of the fluid around failing particles");
   verb->add_flag("--json", arguments->json, "rows as JSON instead of the table");
   verb->add_flag("--quiet", arguments->quiet, "the verdict's line alone");
   verb->callback([arguments, &exit_status] { exit_status = conform(*arguments); });

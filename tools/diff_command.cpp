@@ -32,9 +32,12 @@ nlohmann::ordered_json named(const CheckRow& row) {
 }
 
 nlohmann::ordered_json figures(const CheckRow& row) {
-  return {{"verdict", to_string(judged_verdict(row))}, {"score", row.score},
-          {"value", row.value},                        {"tolerance", row.tolerance},
-          {"worst_id", row.worst_id},                  {"reason", judged_reason(row)}};
+  return {{"verdict", to_string(judged_verdict(row))},
+          {"score", row.score},
+          {"value", row.value},
+          {"tolerance", row.tolerance},
+          {"worst_id", row.worst_id},
+          {"reason", judged_reason(row)}};
 }
 
 nlohmann::ordered_json pairs_json(const std::vector<RowPair>& pairs) {
@@ -77,8 +80,8 @@ std::string json_text(const ReportDiff& diff, int status) {
 }
 
 int diff(const DiffArguments& arguments) {
-  const ReportDiff found = difference(read_report(arguments.before), read_report(arguments.after),
-                                      arguments.factor);
+  const ReportDiff found =
+      difference(read_report(arguments.before), read_report(arguments.after), arguments.factor);
   const int status = found.got_worse() ? exit_does_not_conform : exit_pass;
   if (arguments.json)
     fmt::print("{}\n", json_text(found, status));

@@ -17,4 +17,12 @@ inline void check_output_place(const std::string& option, const std::string& fil
     throw InputError("command line", option, file, "a file in a folder that exists");
 }
 
+/// The same of a folder that is to hold files: it may be missing where its own folder is there.
+inline void check_output_folder(const std::string& option, const std::string& folder) {
+  if (folder.empty() || std::filesystem::is_directory(folder)) return;
+  const auto whole = std::filesystem::absolute(std::filesystem::path(folder) / "").parent_path();
+  if (!std::filesystem::is_directory(whole.parent_path()) || std::filesystem::exists(whole))
+    throw InputError("command line", option, folder, "a folder, or its place in one that exists");
+}
+
 }  // namespace decant

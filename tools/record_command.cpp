@@ -12,7 +12,7 @@
 #include "tools/output_place.hpp"
 #include "tools/phases.hpp"
 #include "tools/progress.hpp"
-#include "version.hpp"
+#include "tools/recording.hpp"
 
 #include <fmt/format.h>
 
@@ -163,12 +163,8 @@ void advance_to(std::int64_t target, std::int64_t& now, const Scene& scene, Back
 
 std::map<std::string, std::string> provenance_of(const RecordArguments& arguments,
                                                  const BackendInfo& info, const Start& start) {
-  return {
-      {"version", version},
-      {"git_revision", git_revision},
-      {"compiler", compiler},
-      {"flags", flags},
-      {"build_type", build_type},
+  auto provenance = build_provenance();
+  provenance.insert({
       {"scene_file", std::filesystem::path(arguments.scene).filename().string()},
       {"started_from", start.origin},
       {"advanced_by", info.name},
@@ -176,7 +172,8 @@ std::map<std::string, std::string> provenance_of(const RecordArguments& argument
       {"advanced_executor", info.executor},
       {"advanced_device", info.device},
       {"advanced_precision", info.precision},
-  };
+  });
+  return provenance;
 }
 
 int record(const RecordArguments& arguments) {
@@ -191,8 +188,7 @@ int record(const RecordArguments& arguments) {
                start.state.size());
   std::fflush(stdout);
 
-  const Walls walls = sample_walls(scene);
-  backend->load(scene, walls, start.state);
+  backend->load(scene, sample_walls(scene), start.state);
   std::int64_t now = start.state.substep;
   Progress progress("substep", phases.back().substep, now, arguments.quiet);
   for (const Phase& phase : phases) {
@@ -202,11 +198,8 @@ int record(const RecordArguments& arguments) {
     fixture.scene = scene;
     backend->read(fixture.state);
     fixture.state.substep = now;
-    fixture.state.quantise();
-    const std::string weakness = evaluate_oracle(scene, fixture.state, fixture.fields.emplace(),
-                                                 fixture.condition.emplace());
-    fixture.ensemble = run_ensemble(scene, walls, fixture.state, arguments.ensemble_substeps,
-                                    arguments.ensemble_members);
+    const std::string weakness =
+        record_answer(fixture, arguments.ensemble_substeps, arguments.ensemble_members);
     if (arguments.sample) reduce_to_sample(fixture);
     fixture.provenance = provenance_of(arguments, info, start);
     // Recorded anew from a fixture as it is: what brought the fluid there stays true.
