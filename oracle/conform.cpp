@@ -119,9 +119,9 @@ std::string evaluate_oracle(const Scene& scene, const ParticleState& state, Fiel
 namespace {
 
 /// The oracle's own run with the looks that a backend's run gets.
-void run_ahead(const Fixture& fixture, Judgement& j) {
+void run_ahead(const Fixture& fixture, int look_every, Judgement& j) {
   for (auto left = static_cast<int>(fixture.ensemble.substeps); left > 0; left -= j.stretches.back())
-    j.stretches.push_back((left + 1) / 2);
+    j.stretches.push_back(look_every > 0 ? std::min(look_every, left) : (left + 1) / 2);
   Solver solver(fixture.scene, j.walls, fixture.state);
   Audit audit(fixture.scene);
   audit.look(fixture.state);
@@ -136,7 +136,7 @@ void run_ahead(const Fixture& fixture, Judgement& j) {
 
 }  // namespace
 
-Judgement prepare(const Fixture& fixture, const CheckSelection& checks) {
+Judgement prepare(const Fixture& fixture, const CheckSelection& checks, int look_every) {
   const Scene& scene = fixture.scene;
   Judgement j;
   j.walls = sample_walls(scene);
@@ -154,7 +154,8 @@ Judgement prepare(const Fixture& fixture, const CheckSelection& checks) {
   }
   if (wanted({"fields"})) j.own_float = float_fields(scene, j.walls, fixture.state);
   if (wanted({"substep"})) j.substep = substep_answer(scene, fixture.state, j.own);
-  if (wanted({"trajectory", "mass", "containment", "determinism"})) run_ahead(fixture, j);
+  if (wanted({"trajectory", "mass", "containment", "determinism"}))
+    run_ahead(fixture, look_every, j);
   if (wanted({"invariance"}))
     for (TransformedProblem& problem : transformed_problems(scene, fixture.state)) {
       Walls walls = sample_walls(problem.scene);

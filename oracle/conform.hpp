@@ -33,8 +33,7 @@ struct Judgement {
   OracleAnswer given;   // accelerations from those inputs
   Fields own_float, given_float;  // the same source in sequential fp32
   SubstepAnswer substep;
-  // The oracle's own run, as long as the fixture's ensemble is, and looked at as backends' runs are:
-  // after half of it, half of the rest, and so on.
+  // The oracle's own run, as long as the fixture's ensemble is, and looked at as backends' runs are.
   std::vector<int> stretches;
   ParticleState later;
   AuditResult later_look;
@@ -52,7 +51,10 @@ std::string evaluate_oracle(const Scene& scene, const ParticleState& state, Fiel
 /// Evaluates the oracle on the fixture's state, as far as these checks need it. Throws InputError where
 /// the recorded fields are not what this build's reference gives within the tolerances scaled from 2⁻²⁴
 /// to 2⁻⁵³.
-Judgement prepare(const Fixture& fixture, const CheckSelection& checks = all_checks());
+/// \param look_every  substeps between two looks at a run, for containment and mass; 0: after half of it,
+///                    half of the rest, and so on
+Judgement prepare(const Fixture& fixture, const CheckSelection& checks = all_checks(),
+                  int look_every = 0);
 
 /// Loads the fixture into the backend and compares; a backend that throws or reports trouble gives
 /// rows with verdict fail and the reason. Rows of the check `fields` carry the stage's name:

@@ -233,6 +233,23 @@ TEST_P(PlantedFault, FailsTheCheckThatIsThereForIt) {
   RecordProperty("margin", std::to_string(margin));
 }
 
+/// Looked at after every substep, a path through a wall is found at the substep that made it.
+TEST(Containment, NamesTheSubstepWhereAsked) {
+  const Fixture fixture = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-stream.h5");
+  Edit edit;
+  edit.advanced = [&](ParticleState& s) {
+    if (s.substep - fixture.state.substep >= 5) s.position.col(20) = Vec3(0, 0, 0.012);
+  };
+  const CheckSelection alone{"containment"};
+  for (const auto& [look_every, found] : {std::pair(1, "first seen 5 "), std::pair(0, "first seen 16 ")}) {
+    EditedReference backend(edit);
+    std::string reason;
+    for (const CheckRow& row : judge(backend, fixture, prepare(fixture, alone, look_every), alone))
+      if (row.field == "crossings") reason = row.reason;
+    EXPECT_NE(reason.find(found), std::string::npos) << reason;
+  }
+}
+
 /// What one evaluation shows thousandfold must show in runs too, wherever viscosity matters.
 TEST(Trajectory, ShowsAPercentOfViscosityInItsEnergy) {
   for (const char* phase : {"settled", "splash"}) {

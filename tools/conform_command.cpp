@@ -33,6 +33,7 @@ struct ConformArguments {
   std::vector<std::string> fixtures, backends, checks;
   std::string executor = "auto", report, junit, surroundings, explain;
   std::string results, oracle, name;
+  int look_every = 0;
   bool all = false, json = false, quiet = false;
 };
 
@@ -122,7 +123,7 @@ CheckRow row_that_did_not_run(const Candidate& candidate, const Fixture& fixture
 }
 
 Report judge_all(std::vector<Candidate>& candidates, const std::vector<Fixture>& fixtures,
-                 const CheckSelection& checks, bool quiet) {
+                 const CheckSelection& checks, int look_every, bool quiet) {
   Report report;
   const auto total = static_cast<std::int64_t>(candidates.size() * fixtures.size());
   const bool any = std::any_of(candidates.begin(), candidates.end(),
@@ -131,7 +132,7 @@ Report judge_all(std::vector<Candidate>& candidates, const std::vector<Fixture>&
   std::int64_t done = 0;
   for (const Fixture& fixture : fixtures) {
     std::unique_ptr<const Judgement> oracle;
-    if (any) oracle = std::make_unique<const Judgement>(prepare(fixture, checks));
+    if (any) oracle = std::make_unique<const Judgement>(prepare(fixture, checks, look_every));
     for (Candidate& candidate : candidates) {
       progress.update(done++, fixture.name + " " + candidate.info.name);
       if (!candidate.backend) {
@@ -290,7 +291,7 @@ int conform(ConformArguments& arguments) {
                  c.backend ? fmt::format("{} on {}", c.info.executor, c.info.device) : c.why_not);
   std::fflush(stdout);
 
-  Report report = judge_all(candidates, fixtures, checks, !talks);
+  Report report = judge_all(candidates, fixtures, checks, arguments.look_every, !talks);
   add_provenance(report, candidates, fixtures);
   const int status = status_of(report, candidates);
   std::vector<Replay> replays;
@@ -323,6 +324,10 @@ void add_conform_command(CLI::App& app, int& exit_status) {
   verb->add_option("--oracle", arguments->oracle,
                    "their own reference, for --results of their own states");
   verb->add_option("--name", arguments->name, "what the report calls --results; default: its file");
+  verb->add_option("--look-every", arguments->look_every,
+                   "substeps between two looks at a run, for containment and mass; 1 names the\n"
+                   "first substep; default: ever shorter stretches")
+      ->check(CLI::Range(1, 1000000));
   verb->add_option("--report", arguments->report, "write an HDF5 report");
   verb->add_option("--junit", arguments->junit, "write JUnit XML, for CI");
   verb->add_option("--surroundings", arguments->surroundings,
