@@ -20,6 +20,7 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <future>
 #include <memory>
 #include <set>
 #include <string>
@@ -130,9 +131,19 @@ Report judge_all(std::vector<Candidate>& candidates, const std::vector<Fixture>&
                                [](const Candidate& c) { return c.backend != nullptr; });
   Progress progress("judgement", total, 0, quiet);
   std::int64_t done = 0;
-  for (const Fixture& fixture : fixtures) {
+  // The oracle is sequential: it works on the next fixture while backends are judged on this one.
+  const auto prepared = [&](std::size_t k) {
+    return std::async(std::launch::async, [&, k] {
+      return std::make_unique<const Judgement>(prepare(fixtures[k], checks, look_every));
+    });
+  };
+  std::future<std::unique_ptr<const Judgement>> next;
+  if (any && !fixtures.empty()) next = prepared(0);
+  for (std::size_t k = 0; k < fixtures.size(); ++k) {
+    const Fixture& fixture = fixtures[k];
     std::unique_ptr<const Judgement> oracle;
-    if (any) oracle = std::make_unique<const Judgement>(prepare(fixture, checks, look_every));
+    if (any) oracle = next.get();
+    if (any && k + 1 < fixtures.size()) next = prepared(k + 1);
     for (Candidate& candidate : candidates) {
       progress.update(done++, fixture.name + " " + candidate.info.name);
       if (!candidate.backend) {
