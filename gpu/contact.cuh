@@ -104,7 +104,7 @@ DECANT_DEVICE Float3 rotate_back(const DevicePose& p, Float3 x) {
 DECANT_DEVICE void respond(const Constants& c, Float3 normal, float gap, const DevicePose* pose,
                            Float3& x, Float3& v) {
   x = x + (c.contact_distance - gap) * normal;
-  const Float3 v_wall = pose ? cross(pose->omega, x - pose->pivot) : Float3{0, 0, 0};
+  const Float3 v_wall = pose ? cross(pose->omega, x - pose->pivot) + pose->surface : Float3{0, 0, 0};
   const Float3 w = v - v_wall;
   const float approach = dot(w, normal);
   if (!(approach < 0.0f)) return;

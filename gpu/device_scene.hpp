@@ -71,10 +71,10 @@ struct Geometry {
   std::vector<Face> faces;
 };
 
-/// x_world = R x_local + translation; velocity = omega × (x_world − pivot).
+/// x_world = R x_local + translation; velocity = omega × (x_world − pivot) + surface.
 struct DevicePose {
   float R[9];  // row by row
-  Float3 translation, pivot, omega;
+  Float3 translation, pivot, omega, surface;
 };
 
 /// Wall particles of all containers in their frames, container by container.

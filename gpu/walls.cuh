@@ -37,7 +37,7 @@ struct Walls {
 
 DECANT_DEVICE void place_wall(const Arrays& a, const Walls& w, int slot, Float3 x, int id,
                               const DevicePose& pose) {
-  const Float3 v = cross(pose.omega, x - pose.pivot);
+  const Float3 v = cross(pose.omega, x - pose.pivot) + pose.surface;
   const float volume = w.volume[id];
   a.now.position[a.base + slot] = w.square ? point_at(x) : make_float4(x.x, x.y, x.z, volume);
   a.point[a.base + slot] = make_float4(x.x, x.y, x.z, 0.0f);

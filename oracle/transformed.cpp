@@ -56,6 +56,7 @@ TransformedProblem turned(const Scene& scene, const ParticleState& state) {
   p.scene.gravity = turned(scene.gravity);
   for (Container& c : p.scene.containers) {
     c.origin = turned(c.origin);
+    c.surface_velocity = turned(c.surface_velocity);
     if (c.tilt) {
       c.tilt->pivot = turned(c.tilt->pivot);
       c.tilt->axis = turned(c.tilt->axis);

@@ -25,6 +25,24 @@ Lattice lattice_in(const SolidBox& box, double dx) {
   return lattice;
 }
 
+/// Lattice evenly about the center; along a rod as in a box, so that it goes on across a period.
+Lattice lattice_in(const RoundShape& shape, double dx) {
+  Lattice lattice = lattice_in(shape.bounds(), dx);
+  const int half = static_cast<int>(std::ceil(shape.radius / dx));
+  for (int a = 0; a < 3; ++a) {
+    if (a == shape.axis) continue;
+    lattice.first[a] = shape.center[a] - (half - 0.5) * dx;
+    lattice.size[static_cast<std::size_t>(a)] = 2 * half;
+  }
+  return lattice;
+}
+
+bool holds(const RoundShape& shape, const Vec3& x, double dx) {
+  Vec3 away = x - shape.center;
+  if (shape.axis >= 0) away[shape.axis] = 0;
+  return away.norm() <= shape.radius - 0.5 * dx * (1 - 1e-6);
+}
+
 /// Lattice about the axis of a revolved cavity, from its bottom up to the level.
 Lattice lattice_in(const RevolvedShape& shape, double level, double dx) {
   double widest = 0, bottom = INFINITY;
@@ -48,7 +66,9 @@ ParticleState initial_state(const Scene& scene) {
     for (const auto& c : scene.containers)
       if (c.name == fill.container) container = &c;
     Lattice lattice;
-    if (fill.box) {
+    if (fill.round) {
+      lattice = lattice_in(*fill.round, dx);
+    } else if (fill.box) {
       lattice = lattice_in(*fill.box, dx);
     } else if (const auto* revolved = std::get_if<RevolvedShape>(&container->shape)) {
       lattice = lattice_in(*revolved, fill.level, dx);
@@ -64,11 +84,12 @@ ParticleState initial_state(const Scene& scene) {
       for (int j = 0; j < lattice.size[1]; ++j)
         for (int i = 0; i < lattice.size[0]; ++i) {
           const Vec3 x = lattice.first + dx * Vec3(i, j, k);
+          if (fill.round && !holds(*fill.round, x, dx)) continue;
           if (solid &&
               (!solid->in_cavity(x) || solid->at(x).distance < 0.5 * dx * (1 - 1e-6)))
             continue;
           position.push_back(pose.to_world(x));
-          velocity.push_back(fill.velocity);
+          velocity.push_back(fill.velocity_at(position.back()));
         }
     if (position.size() == before)
       throw std::runtime_error("fill " + std::to_string(&fill - scene.fills.data()) +

@@ -20,6 +20,7 @@ TiltAngle tilt_at(const Tilt& tilt, double time) {
 Pose pose_at(const Container& container, double time) {
   Pose pose;
   pose.translation = container.origin;
+  pose.surface_velocity = container.surface_velocity;
   if (!container.tilt) return pose;
   const Tilt& tilt = *container.tilt;
   const TiltAngle at = tilt_at(tilt, time);
@@ -27,6 +28,7 @@ Pose pose_at(const Container& container, double time) {
   pose.pivot = tilt.pivot;
   pose.translation = tilt.pivot + pose.rotation * (container.origin - tilt.pivot);
   pose.angular_velocity = at.rate * tilt.axis;
+  pose.surface_velocity = pose.rotation * container.surface_velocity;
   return pose;
 }
 

@@ -7,16 +7,19 @@
 namespace decant {
 
 /// Rigid placement: x_world = rotation · x_local + translation; a material point at x_world moves
-/// with angular_velocity × (x_world − pivot).
+/// with angular_velocity × (x_world − pivot); its surface slides over it with surface_velocity.
 struct Pose {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Vec3 translation = Vec3::Zero();       // m
   Vec3 pivot = Vec3::Zero();             // m, world
   Vec3 angular_velocity = Vec3::Zero();  // rad/s
+  Vec3 surface_velocity = Vec3::Zero();  // m/s, world
 
   Vec3 to_world(const Vec3& local) const { return rotation * local + translation; }
   Vec3 to_local(const Vec3& world) const { return rotation.transpose() * (world - translation); }
-  Vec3 velocity_at(const Vec3& world) const { return angular_velocity.cross(world - pivot); }
+  Vec3 velocity_at(const Vec3& world) const {
+    return angular_velocity.cross(world - pivot) + surface_velocity;
+  }
 };
 
 struct TiltAngle {
@@ -30,7 +33,7 @@ TiltAngle tilt_at(const Tilt& tilt, double time);
 /// Pose of a container at time t (s).
 Pose pose_at(const Container& container, double time);
 
-/// True where the container can move at all.
+/// True where the container can move at all; one whose surface alone runs does not.
 inline bool moves(const Container& container) { return container.tilt.has_value(); }
 
 }  // namespace decant

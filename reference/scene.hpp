@@ -72,15 +72,39 @@ struct Container {
   Vec3 origin = Vec3::Zero();  // m, world position of the container's frame while untilted
   double wall_thickness = 0;   // m, the thinnest wall of the solid
   std::optional<Tilt> tilt;
+  /// m/s, container frame: the surface runs like a belt while the container stays in its place.
+  Vec3 surface_velocity = Vec3::Zero();
 };
 
-/// Fluid at the start: a lattice of spacing dx that begins dx/2 from the surfaces, either in a
-/// container up to a level, or in a free box.
+/// A ball, or a rod along one axis.
+struct RoundShape {
+  Vec3 center;     // m
+  double radius;   // m
+  int axis = -1;   // 0 … 2: of a rod; −1: a ball
+  double length = 0;  // m, of a rod, half of it on either side of the center
+
+  SolidBox bounds() const {
+    Vec3 half = Vec3::Constant(radius);
+    if (axis >= 0) half[axis] = 0.5 * length;
+    return {center - half, center + half};
+  }
+};
+
+/// Fluid at the start: a lattice of spacing dx that begins dx/2 from the surfaces, in a container up to
+/// a level, in a box, or in a ball or rod, whose lattice lies evenly about its center.
 struct Fill {
-  std::string container;        // empty: the box is in the world and stands alone
-  double level = 0;             // m above the cavity's bottom (container) — unused for a box
+  std::string container;        // empty: the shape is in the world and stands alone
+  double level = 0;             // m above the cavity's bottom (container) — unused for a shape
   std::optional<SolidBox> box;  // m, world, or container frame where a container is named
-  Vec3 velocity = Vec3::Zero();  // m/s
+  // v(x) = velocity + velocity_gradient (x − gradient_about), world
+  Vec3 velocity = Vec3::Zero();                                // m/s
+  Eigen::Matrix3d velocity_gradient = Eigen::Matrix3d::Zero();  // 1/s
+  Vec3 gradient_about = Vec3::Zero();                           // m
+  std::optional<RoundShape> round = std::nullopt;  // what there is of `box`, its bounds
+
+  Vec3 velocity_at(const Vec3& x) const {
+    return velocity + velocity_gradient * (x - gradient_about);
+  }
 };
 
 /// Analytic plane z = height without wall particles.

@@ -20,6 +20,7 @@ namespace {
 const Range positive{.low = 0.0, .high = 1e6, .low_open = true};
 const Range non_negative{.low = 0.0, .high = 1e6};
 const Range coordinate{.low = -1e4, .high = 1e4};  // m
+const Range speed{.low = -1e4, .high = 1e4};  // m/s
 const Range unit_interval{.low = 0.0, .high = 1.0};
 
 const ObjectKeys& keys_of(const std::string& name) {
@@ -218,7 +219,21 @@ Container read_container(const JsonValue& v, const Domain& domain) {
     container.shape = std::move(shape);
   }
   if (v.has("tilt")) container.tilt = read_tilt(v["tilt"]);
+  if (v.has("surface_velocity")) container.surface_velocity = v["surface_velocity"].vector(speed);
   return container;
+}
+
+/// The ball or rod of a fill.
+RoundShape read_round(const JsonValue& fill) {
+  const bool rod = fill.has("rod");
+  const JsonValue v = fill[rod ? "rod" : "ball"];
+  v.check_keys(keys_of(rod ? "rod" : "ball"));
+  RoundShape shape{v["center"].vector(coordinate), v["radius"].number(positive)};
+  if (rod) {
+    shape.axis = static_cast<int>(v["axis"].choice({"x", "y", "z"}));
+    shape.length = v["length"].number(positive);
+  }
+  return shape;
 }
 
 Fill read_fill(const JsonValue& v, const std::vector<Container>& containers) {
@@ -234,14 +249,27 @@ Fill read_fill(const JsonValue& v, const std::vector<Container>& containers) {
     }
     if (!found) v["container"].refuse("the name of a container: " + names);
   }
-  if (v.has("level") == v.has("box")) v.refuse("exactly one of level and box");
+  if (v.has("level") + v.has("box") + v.has("ball") + v.has("rod") != 1)
+    v.refuse("exactly one of level, box, ball, rod");
   if (v.has("level")) {
     if (fill.container.empty()) v["level"].refuse("a box, because no container is named");
     fill.level = v["level"].number(positive);
-  } else {
+  } else if (v.has("box")) {
     fill.box = read_box(v["box"], "box");
+  } else {
+    fill.round = read_round(v);
+    fill.box = fill.round->bounds();
   }
-  if (v.has("velocity")) fill.velocity = v["velocity"].vector({.low = -1e4, .high = 1e4});
+  if (v.has("velocity")) fill.velocity = v["velocity"].vector(speed);
+  if (v.has("velocity_gradient")) {
+    const JsonValue gradient = v["velocity_gradient"];
+    gradient.check_keys(keys_of("velocity_gradient"));
+    const auto rows = gradient["matrix"].elements(3, 3);
+    for (Eigen::Index a = 0; a < 3; ++a)
+      fill.velocity_gradient.row(a) = rows[static_cast<std::size_t>(a)].vector(
+          {.low = -1e6, .high = 1e6}).transpose();
+    fill.gradient_about = gradient["about"].vector(coordinate);
+  }
   return fill;
 }
 
@@ -278,7 +306,7 @@ const std::vector<ObjectKeys>& scene_file_keys() {
       {"domain", {"min", "max"}, {"periodic"}},
       {"floor", {"height"}, {}},
       {"contact", {}, {"distance_ratio", "restitution", "friction"}},
-      {"container", {"name"}, {"cup", "tank", "revolved", "boxes", "origin", "tilt"}},
+      {"container", {"name"}, {"cup", "tank", "revolved", "boxes", "origin", "tilt", "surface_velocity"}},
       {"cup", {"inner_radius", "inner_height", "wall_thickness"}, {}},
       {"tank", {"size", "wall_thickness"}, {"open"}},
       {"revolved", {"profile", "wall_thickness"}, {}},
@@ -286,7 +314,12 @@ const std::vector<ObjectKeys>& scene_file_keys() {
       {"box", {"min", "max"}, {}},
       {"tilt", {"pivot", "axis", "keys"}, {}},
       {"tilt_key", {"time"}, {"angle", "angle_deg"}},
-      {"fill", {}, {"container", "level", "box", "velocity"}},
+      {"fill",
+       {},
+       {"container", "level", "box", "ball", "rod", "velocity", "velocity_gradient"}},
+      {"ball", {"center", "radius"}, {}},
+      {"rod", {"center", "radius", "axis", "length"}, {}},
+      {"velocity_gradient", {"matrix", "about"}, {}},
       {"time",
        {"end", "frames"},
        {"courant", "substeps_per_frame", "substeps_derived", "max_speed"}},

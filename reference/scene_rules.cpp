@@ -3,6 +3,7 @@
 /// number of particles.
 #include "reference/error.hpp"
 #include "reference/initial_state.hpp"
+#include "reference/pose.hpp"
 #include "reference/scene_checks.hpp"
 #include "reference/scene_json_reader.hpp"
 #include "reference/sweep.hpp"
@@ -36,6 +37,19 @@ double catching_elevation(const Scene& scene, const Vec3& up) {
   for (const auto& c : scene.containers)
     lowest = std::min(lowest, -farthest_along(-up, cavity_bottom_rings(c), &c, scene.schedule.end));
   return std::isfinite(lowest) ? lowest : box_elevation(scene.domain.min, scene.domain.max);
+}
+
+/// Of a linear field over a convex hull: at a corner.
+double fastest_start(const Fill& fill, const std::vector<Ring>& rings, const Container* container) {
+  const Pose pose = container ? pose_at(*container, 0.0) : Pose{};
+  double fastest = 0;
+  for (const Ring& ring : rings)
+    for (const double side_x : {-1.0, 1.0})
+      for (const double side_y : {-1.0, 1.0}) {
+        const Vec3 corner = ring.center + ring.radius * Vec3(side_x, side_y, 0);
+        fastest = std::max(fastest, fill.velocity_at(pose.to_world(corner)).norm());
+      }
+  return fastest;
 }
 
 std::int64_t particles_at(Scene scene, double spacing) {
@@ -72,8 +86,9 @@ double expected_max_speed(const Scene& scene) {
   for (const auto& fill : scene.fills) {
     const Container* container = container_of(scene, fill);
     const auto rings = fill_rings(fill, container);
-    double start = fill.velocity.norm();
+    double start = fastest_start(fill, rings, container);
     if (container) start = std::max(start, fastest_point(rings, *container));
+    for (const auto& c : scene.containers) start = std::max(start, c.surface_velocity.norm());
     double fall = 0;
     if (gravity > 0)
       fall = std::max(0.0, farthest_along(up, rings, container, scene.schedule.end) - caught);

@@ -50,17 +50,32 @@ json container_json(const Container& container) {
                    {"axis", vector_json(container.tilt->axis)},
                    {"keys", keys}};
   }
+  if (!container.surface_velocity.isZero(0))
+    out["surface_velocity"] = vector_json(container.surface_velocity);
   return out;
 }
 
 json fill_json(const Fill& fill) {
   json out = json::object();
   if (!fill.container.empty()) out["container"] = fill.container;
-  if (fill.box)
+  if (fill.round) {
+    json& round = out[fill.round->axis < 0 ? "ball" : "rod"];
+    round = {{"center", vector_json(fill.round->center)}, {"radius", fill.round->radius}};
+    if (fill.round->axis >= 0) {
+      round["axis"] = std::string(1, "xyz"[fill.round->axis]);
+      round["length"] = fill.round->length;
+    }
+  } else if (fill.box)
     out["box"] = box_json(*fill.box);
   else
     out["level"] = fill.level;
   out["velocity"] = vector_json(fill.velocity);
+  if (!fill.velocity_gradient.isZero(0)) {
+    json matrix = json::array();
+    for (Eigen::Index a = 0; a < 3; ++a)
+      matrix.push_back(vector_json(fill.velocity_gradient.row(a).transpose()));
+    out["velocity_gradient"] = {{"matrix", matrix}, {"about", vector_json(fill.gradient_about)}};
+  }
   return out;
 }
 

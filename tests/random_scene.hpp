@@ -74,6 +74,8 @@ inline Fixture random_fixture(std::uint32_t seed) {
     f.state.velocity.col(i) = Vec3(real(-1, 1), real(-1, 1), real(-1, 1));
   }
   f.state.quantise();
+  if (!scene.containers.empty() && chance(0.3))
+    scene.containers[0].surface_velocity = Vec3(real(-1, 1), real(-1, 1), real(-1, 1));
   return f;
 }
 

@@ -269,6 +269,56 @@ TEST(BoxFill, StandsInTheWorldOrInItsContainersFrame) {
   EXPECT_EQ(Vec3(state.velocity.col(3)), Vec3::UnitX());
 }
 
+TEST(RoundFill, LiesEvenlyAboutItsCenter) {
+  Scene scene = tank_scene();
+  const double dx = scene.particle_spacing;
+  scene.containers.clear();
+  scene.domain = {Vec3(-1, -1, -1), Vec3(1, 1, 1), {}};
+  const Vec3 center(0.25, -0.125, 0.5);
+  Fill ball;
+  ball.round = RoundShape{center, 3.2 * dx};
+  ball.box = ball.round->bounds();
+  scene.fills = {ball};
+  const ParticleState state = initial_state(scene);
+  EXPECT_LT((state.position.rowwise().mean() - center).norm(), 1e-7);
+  Eigen::Index expected = 0;
+  for (int k = -4; k < 4; ++k)
+    for (int j = -4; j < 4; ++j)
+      for (int i = -4; i < 4; ++i)
+        expected += Vec3(i + 0.5, j + 0.5, k + 0.5).norm() <= 2.7;
+  EXPECT_EQ(state.size(), expected);
+}
+
+TEST(RoundFill, ARodAsLongAsThePeriodGoesOnAcrossIt) {
+  Scene scene = tank_scene();
+  const double dx = scene.particle_spacing;
+  scene.containers.clear();
+  scene.domain = {Vec3(-1, 0, -1), Vec3(1, 6 * dx, 1), {false, true, false}};
+  Fill rod;
+  rod.round = RoundShape{Vec3(0, 3 * dx, 0), 4 * dx, 1, 6 * dx};
+  rod.box = rod.round->bounds();
+  scene.fills = {rod};
+  const ParticleState state = initial_state(scene);
+  EXPECT_EQ(state.size() % 6, 0);
+  EXPECT_NEAR(state.position.row(1).minCoeff(), 0.5 * dx, 1e-8);
+  EXPECT_NEAR(state.position.row(1).maxCoeff(), 5.5 * dx, 1e-8);
+  EXPECT_LE((state.position.row(0).array().square() + state.position.row(2).array().square())
+                .sqrt().maxCoeff(), 3.5 * dx * (1 + 1e-6));
+}
+
+TEST(Fill, VelocityFollowsItsGradientInTheWorld) {
+  Scene scene = tank_scene();
+  Fill& fill = scene.fills[0];
+  fill.velocity = {1, 2, 3};
+  fill.velocity_gradient << 0, 1, 0, 0, 0, -2, 3, 0, 0;
+  fill.gradient_about = {0.1, 0.2, 0.3};
+  const ParticleState state = initial_state(scene);
+  for (Eigen::Index i = 0; i < state.size(); ++i) {
+    const Vec3 d = state.position.col(i) - fill.gradient_about;
+    EXPECT_LT((state.velocity.col(i) - Vec3(1 + d.y(), 2 - 2 * d.z(), 3 + 3 * d.x())).norm(), 1e-6);
+  }
+}
+
 TEST(CupFill, LeansWithACupThatStartsTilted) {
   Scene scene = cup_scene(0.06);
   const Vec3 pivot = scene.containers[0].origin;

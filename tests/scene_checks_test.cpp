@@ -253,6 +253,12 @@ TEST(ExpectedMaxSpeed, CountsTheFirstVelocityAndYieldsToTheScene) {
   EXPECT_DOUBLE_EQ(expected_max_speed(scene), std::sqrt(25 + 2 * 9.81 * 0.12));
   scene.gravity.setZero();
   EXPECT_DOUBLE_EQ(expected_max_speed(scene), 5);
+  // At the corner farthest along z: 12 m/s more of it.
+  scene.fills[0].velocity_gradient(2, 2) = 100;
+  EXPECT_DOUBLE_EQ(expected_max_speed(scene), std::hypot(3, 16));
+  scene.fills[0].velocity_gradient.setZero();
+  scene.containers[0].surface_velocity = {0, 7, 0};
+  EXPECT_DOUBLE_EQ(expected_max_speed(scene), 7);
   scene.schedule.max_speed = 1.5;
   EXPECT_EQ(expected_max_speed(scene), 1.5);
 }

@@ -27,7 +27,7 @@ class Bits {
     if (s.floor) add(s.floor->height);
     add(s.contact.distance_ratio, s.contact.restitution, s.contact.friction);
     for (const auto& c : s.containers) {
-      add(c.origin), add(c.wall_thickness);
+      add(c.origin), add(c.wall_thickness), add(c.surface_velocity);
       if (const auto* revolved = std::get_if<RevolvedShape>(&c.shape)) {
         for (const auto& p : revolved->profile) add(p[0], p[1]);
       } else {
@@ -42,6 +42,12 @@ class Bits {
     for (const auto& fill : s.fills) {
       add(fill.level), add(fill.velocity);
       if (fill.box) add(*fill.box);
+      for (Eigen::Index a = 0; a < 3; ++a) add(Vec3(fill.velocity_gradient.col(a)));
+      add(fill.gradient_about);
+      if (fill.round) {
+        add(fill.round->center);
+        add(fill.round->radius, fill.round->axis, fill.round->length);
+      }
     }
     add(s.schedule.end, s.schedule.courant, s.schedule.max_speed.value_or(-1.0));
   }
@@ -81,7 +87,8 @@ bool same(const Scene& a, const Scene& b) {
   }
   for (std::size_t i = 0; i < a.fills.size(); ++i)
     if (a.fills[i].container != b.fills[i].container ||
-        a.fills[i].box.has_value() != b.fills[i].box.has_value())
+        a.fills[i].box.has_value() != b.fills[i].box.has_value() ||
+        a.fills[i].round.has_value() != b.fills[i].round.has_value())
       return false;
   return Bits(a).all() == Bits(b).all();
 }
@@ -128,6 +135,7 @@ Container container(int index, const Domain& domain) {
     for (int k = 0; k < keys; ++k) tilt.keys.push_back({k + real(0, 0.9), real(-6, 6)});
     c.tilt = tilt;
   }
+  if (coin()) c.surface_velocity = vec(-1, 1);
   return c;
 }
 
@@ -153,9 +161,21 @@ Scene any_scene() {
       fill.container = s.containers[static_cast<std::size_t>(integer(0, containers - 1))].name;
     if (!fill.container.empty() && coin())
       fill.level = real(0.01, 1);
-    else
+    else if (coin())
       fill.box = box();
+    else {
+      fill.round = RoundShape{vec(-1, 1), real(0.1, 1)};
+      if (coin()) {
+        fill.round->axis = integer(0, 2);
+        fill.round->length = real(0.1, 1);
+      }
+      fill.box = fill.round->bounds();
+    }
     fill.velocity = vec(-1, 1);
+    if (coin()) {
+      for (Eigen::Index a = 0; a < 3; ++a) fill.velocity_gradient.col(a) = vec(-9, 9);
+      fill.gradient_about = vec(-1, 1);
+    }
     s.fills.push_back(fill);
   }
   s.schedule.end = real(0.1, 10);

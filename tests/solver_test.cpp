@@ -118,6 +118,19 @@ TEST(Contact, IsWithTheWallsOwnVelocity) {
   EXPECT_LT((v - Vec3(0.5, 6 - 3.625, 0)).norm(), 1e-14);
 }
 
+TEST(Contact, IsWithASurfaceThatRuns) {
+  Scene scene = open_scene();
+  scene.contact.friction = 1;
+  Container belt{"belt", cup_shape(1, 1, 0.1), Vec3::Zero(), 0.1, {}};
+  belt.tilt = Tilt{Vec3::Zero(), Vec3::UnitZ(), {{0, std::numbers::pi / 2}}};
+  belt.surface_velocity = {3, 0, 0};  // (0, 3, 0) in the world
+  const Pose pose = pose_at(belt, 5);
+  Vec3 x(2, 0, 0), v(-1, 0, 0);
+  EXPECT_TRUE(push_out(scene, 0.002, Vec3::UnitX(), pose, x, v));
+  // w = (−1, −3, 0), j = 1, slip 3 loses 1.
+  EXPECT_LT((v - Vec3(0, 1, 0)).norm(), 1e-12);
+}
+
 TEST(Contact, LeavesWhatIsFarOrParts) {
   const Scene scene = open_scene();
   Vec3 x(1, 2, 3), v(-1, 0, 0);
