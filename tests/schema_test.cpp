@@ -3,6 +3,7 @@
 #include "oracle/report.hpp"
 #include "tests/python.hpp"
 #include "tests/small_fixture.hpp"
+#include "tools/validation/validation.hpp"
 
 #include <gtest/gtest.h>
 
@@ -50,6 +51,17 @@ TEST_F(Schema, AReportIsAsDocumented) {
   write_report(file_, report);
   EXPECT_EQ(checked(file_), 0);
   write_report(file_, {});
+  EXPECT_EQ(checked(file_), 0);
+}
+
+TEST_F(Schema, AValidationIsAsDocumented) {
+  ValidationResult result;
+  result.name = "case";
+  result.add({"right", "m", 1, 1.01, 0.01, 0.02});
+  result.curves.push_back({"panel", "found", "x", "m", "y", "Pa", false, {0, 1}, {2, 3}});
+  write_validation(file_, {result});
+  EXPECT_EQ(checked(file_), 0);
+  write_validation(file_, {});
   EXPECT_EQ(checked(file_), 0);
 }
 

@@ -3,7 +3,7 @@
 
     check_schema.py FILE.h5 …
 
-Reads the table in oracle/fixture-format.md, report-format.md or results-format.md and compares
+Reads the table in oracle/fixture-format.md, report-format.md, results-format.md or validation-format.md and compares
 names, dtypes, shapes and units with what stands in the file. Exit status: 0 as documented, 1 not,
 2 bad input.
 """
@@ -138,6 +138,21 @@ def check_report(check, rows):
         check.complain(f"/summary/{name}", "not in the document")
 
 
+def check_validation(check, rows):
+    file = check.file
+    for path, dtype, shape, unit, where in rows:
+        if where == "all":
+            check.row(path, dtype, shape, unit)
+    for name in file.get("curves", {}):
+        for path, dtype, shape, unit, where in rows:
+            if where == "curve":
+                check.row(path.replace("*", name, 1), dtype, shape, unit, scope=name)
+    if check.complaints:
+        return
+    if set(file["quantities/verdict"][:]) - {b"pass", b"fail", b"reported"}:
+        check.complain("/quantities/verdict", "a value other than pass, fail, reported")
+
+
 def check_parts(check, rows, kind):
     """Inputs, results, references: rows of this kind, and those of kind? where they are there."""
     file = check.file
@@ -171,6 +186,8 @@ def complaints_about(path):
         check = Checker(file)
         if "decant_fixture" in file.attrs:
             check_fixture(check, rows_of(FORMATS / "fixture-format.md"))
+        elif "decant_validation" in file.attrs:
+            check_validation(check, rows_of(FORMATS / "validation-format.md"))
         elif "decant_report" in file.attrs:
             check_report(check, rows_of(FORMATS / "report-format.md"))
         else:

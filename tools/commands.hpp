@@ -35,6 +35,10 @@ void add_bench_command(CLI::App& app, int& exit_status);
 /// `decant export`: what a solver in another language needs of a fixture.
 void add_export_command(CLI::App& app, int& exit_status);
 
+/// `decant validate`: the solver against cases whose answer is known. Exit status 1 where a gate is not
+/// met.
+void add_validate_command(CLI::App& app, int& exit_status);
+
 /// `decant record`: runs the oracle and writes a fixture.
 void add_record_command(CLI::App& app, int& exit_status);
 

@@ -20,6 +20,7 @@ constexpr const char* footer =
     "  decant conform --backend brute --report build/report.h5\n"
     "  decant diff before.h5 build/report.h5\n"
     "  decant record fixtures/scenes/pour-4k.json --out pour-4k-stream.h5\n"
+    "  decant validate --quick\n"
     "  decant info\n"
     "\n"
     "Exit status: 0 pass, 1 does not conform, 2 bad input, 3 backend or device failure,\n"
@@ -45,6 +46,7 @@ int main(int argc, char** argv) {
   add_export_command(app, status);
   add_diff_command(app, status);
   add_bench_command(app, status);
+  add_validate_command(app, status);
   add_info_command(app, status);
   try {
     app.parse(argc, argv);
