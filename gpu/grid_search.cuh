@@ -263,6 +263,7 @@ class GridSearch {
   }
 
   void rebuild_walls(Queue& queue, const Arrays& a) {
+    if (n_ == 0) return;  // it is a particle that begins the substep, from which poses are counted
     for (std::size_t k = 0; k < walls_.segments.size(); ++k) {
       if (!rebuilt(k)) continue;
       const WallSegment& s = walls_.segments[k];
