@@ -26,7 +26,7 @@ def text(values):
 
 
 class Report:
-    """One report, or several: of runs that several hold the last one counts."""
+    """One report, or several: of a case that several hold the last one counts."""
 
     def __init__(self, paths):
         self.runs, self.quantities, self.curves, self.orders = [], [], [], []
@@ -34,23 +34,22 @@ class Report:
             self.add(path)
 
     def add(self, path):
-        first = len(self.runs)
-        parts = self.runs, self.quantities, self.curves, self.orders
+        before = self.runs, self.quantities, self.curves, self.orders
         self.runs, self.quantities, self.curves, self.orders = [], [], [], []
         self.read(path)
-        key = lambda run: (run["case"], run["resolution"], run["backend"], run["options"])
-        new = {key(run) for run in self.runs}
-        for run in parts[0]:
-            run["replaced"] = run.get("replaced") or key(run) in new
         for row in self.quantities + self.curves:
-            row["run"] += first
+            row["run"] += len(before[0])
         cases = {run["case"] for run in self.runs}
-        self.runs = parts[0] + self.runs
-        kept = lambda rows: [r for r in rows if not self.runs[r["run"]].get("replaced")]
-        self.quantities = kept(parts[1] + self.quantities)
-        self.curves = kept(parts[2] + self.curves)
-        # Orders across reports would have to be formed anew.
-        self.orders = [o for o in parts[3] if o["case"] not in cases] + self.orders
+        self.runs = before[0] + self.runs
+        self.orders = [o for o in before[3] if o["case"] not in cases] + self.orders
+
+        def kept(rows):
+            return [r for r in rows if self.runs[r["run"]]["case"] not in cases]
+
+        self.quantities = kept(before[1]) + self.quantities
+        self.curves = kept(before[2]) + self.curves
+        for run in before[0]:
+            run["replaced"] = run.get("replaced", False) or run["case"] in cases
 
     def read(self, path):
         with h5py.File(path) as file:
@@ -157,7 +156,7 @@ def table(report, runs):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("report", nargs="+",
-                        help="HDF5 of decant validate; of a run in several, the last counts")
+                        help="HDF5 of decant validate; of a case in several, the last counts")
     parser.add_argument("--out", required=True, help="folder for pictures and index.html")
     arguments = parser.parse_args()
     report = Report(arguments.report)
@@ -167,21 +166,21 @@ def main():
     met = sum(q["verdict"] == "pass" for q in gates)
     page = [f"<!doctype html><meta charset=utf-8><title>Validation</title><style>{STYLE}</style>",
             f"<h1>Validation: {met} of {len(gates)} gates met</h1>"]
-    backends = dict.fromkeys((r["backend"], r["options"], r["executor"], r["device"])
-                             for r in report.runs)
+    runs = [r for r in report.runs if not r.get("replaced", False)]
+    backends = dict.fromkeys((r["backend"], r["options"], r["executor"], r["device"]) for r in runs)
     page.append("<p>" + "; ".join(html.escape(" ".join(filter(None, b))) for b in backends)
                 + f". Version {html.escape(str(report.provenance.get('git_revision', '')))}.</p>")
-    for name in dict.fromkeys(r["case"] for r in report.runs):
-        runs = sorted((k for k, r in enumerate(report.runs)
-                       if r["case"] == name and not r.get("replaced")),
-                      key=lambda k: report.runs[k]["resolution"])
+    for name in dict.fromkeys(r["case"] for r in runs):
+        of_case = sorted((k for k, r in enumerate(report.runs)
+                          if r["case"] == name and not r.get("replaced", False)),
+                         key=lambda k: report.runs[k]["resolution"])
         page.append(f"<h2>{html.escape(name)}</h2>"
-                    f"<p>{html.escape(report.runs[runs[0]]['source'])}</p>")
+                    f"<p>{html.escape(report.runs[of_case[0]]['source'])}</p>")
         picture = out / f"{name}.png"
-        if draw(report, runs, picture):
+        if draw(report, of_case, picture):
             data = base64.b64encode(picture.read_bytes()).decode()
             page.append(f'<img alt="{html.escape(name)}" src="data:image/png;base64,{data}">')
-        page.append(table(report, runs))
+        page.append(table(report, of_case))
         orders = [o for o in report.orders if o["case"] == name]
         if orders:
             page.append("<table><tr><th>observed order<th>from<th>to<th></tr>" + "".join(
