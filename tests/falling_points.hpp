@@ -83,9 +83,11 @@ class FallingPoints : public Backend {
   std::function<void(std::int64_t substep)> before_advance;
   std::int64_t trouble_at = -1;
 
- private:
+ protected:
   Scene scene_;
   ParticleState state_;
+
+ private:
   std::int64_t calls_ = 0;
 };
 

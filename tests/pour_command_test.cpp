@@ -99,6 +99,37 @@ TEST(Pour, AccountsForAllMassAtEveryFrame) {
   EXPECT_EQ(result.timeline.rows.size(), 13u);
 }
 
+/// The first particle leaps in an arch, out of the fixed cup over its rim, or straight through its wall.
+class Leaping : public FallingPoints {
+ public:
+  explicit Leaping(double height) : height_(height) {}
+  void load(const Scene& scene, const Walls& walls, const ParticleState& state) override {
+    FallingPoints::load(scene, walls, state);
+    state_.position.col(0) = Vec3(0, 0, 0.05);
+  }
+  Status advance(int substeps) override {
+    state_.substep += substeps;
+    const double s = scene_.time_at(state_.substep) / scene_.schedule.end;
+    state_.position.col(0) = Vec3(0.3 * s, 0, 0.05 + 4 * height_ * s * (1 - s));
+    return {};
+  }
+
+ private:
+  double height_;
+};
+
+TEST(Pour, FollowsPathsOverARimHoweverFewFramesThereAre) {
+  for (const int frames : {1, 2, 30}) {
+    const TemporaryFolder folder;
+    Scene scene = test::falling_points_scene(frames);
+    scene.schedule.substeps_per_frame = 300 / frames;
+    Leaping over(0.3), through(0);
+    EXPECT_FALSE(pour(scene, over, quiet_options(folder / "over")).summary.penetrated()) << frames;
+    EXPECT_TRUE(pour(scene, through, quiet_options(folder / "through")).summary.penetrated())
+        << frames;
+  }
+}
+
 TEST(Pour, StoppedAndResumedEndsInTheSameBits) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene();

@@ -21,6 +21,7 @@
 #include <sys/stat.h>
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <random>
@@ -102,6 +103,30 @@ void check_room(const PourOptions& options, const Files& files, const FrameLayou
                      fmt::format("needs {}, free are {}", size_text(needed), size_text(available)));
 }
 
+/// How often walls are looked at between two frames. Paths are followed as straight lines: what moves
+/// further than two walls are thick, at the speed to expect, may turn on its way.
+std::int64_t looks_per_frame(const Scene& scene) {
+  double thinnest = INFINITY;
+  for (const Container& container : scene.containers)
+    thinnest = std::min(thinnest, container.wall_thickness);
+  const double way = expected_max_speed(scene) * scene.time_step() *
+                     static_cast<double>(scene.schedule.substeps_per_frame);
+  return std::clamp<std::int64_t>(static_cast<std::int64_t>(std::ceil(way / (2 * thinnest))), 1,
+                                  scene.schedule.substeps_per_frame);
+}
+
+/// What a look at walls found, joined to what another one found.
+void keep_worst(AuditResult& all, const AuditResult& one) {
+  if (one.deepest > all.deepest) {
+    all.deepest = one.deepest;
+    all.deepest_particle = one.deepest_particle;
+  }
+  all.inside = std::max(all.inside, one.inside);
+  all.crossed += one.crossed;
+  if (all.first_crossed < 0) all.first_crossed = one.first_crossed;
+  all.max_speed = std::max(all.max_speed, one.max_speed);
+}
+
 bool finite(const ParticleState& state) {
   return state.position.allFinite() && state.velocity.allFinite();
 }
@@ -117,7 +142,7 @@ class Pour {
   void start();
   void resume();
   void open_frames(bool anew);
-  void look(double solver_seconds);
+  void look(double solver_seconds, const AuditResult& on_the_way = {});
   void next_frame();
   void checkpoint();
   void finish();
@@ -236,10 +261,11 @@ void Pour::open_frames(bool anew) {
   });
 }
 
-void Pour::look(double solver_seconds) {
+void Pour::look(double solver_seconds, const AuditResult& on_the_way) {
   Fields fields = Fields::unwritten(state_.size(), walls_.size());
   check(backend_.evaluate(fields), state_);
-  const AuditResult audit = audit_.look(state_);
+  AuditResult audit = audit_.look(state_);
+  keep_worst(audit, on_the_way);
   TimelineRow row;
   try {
     row = timeline_row(frame_, scene_, state_, fields, audit);
@@ -253,21 +279,28 @@ void Pour::look(double solver_seconds) {
 }
 
 void Pour::next_frame() {
-  const std::int64_t expected = state_.substep + scene_.schedule.substeps_per_frame;
-  const auto before = Clock::now();
-  const Status status = backend_.advance(scene_.schedule.substeps_per_frame);
-  const double solver_seconds = seconds_since(before);
-  check(status, state_);
-  ParticleState next;
-  backend_.read(next);
-  if (next.substep != expected || next.size() != state_.size())
-    throw BackendError(fmt::format("{}: {} particles at substep {} instead of {} at {}",
-                                   backend_.info().name, next.size(), next.substep, state_.size(),
-                                   expected));
-  if (!finite(next)) check({Status::non_finite, -1, next.substep}, state_);
-  state_ = std::move(next);
+  double solver_seconds = 0;
+  AuditResult on_the_way;
+  const std::int64_t all = scene_.schedule.substeps_per_frame, looks = looks_per_frame(scene_);
+  for (std::int64_t k = 1; k <= looks; ++k) {
+    const std::int64_t substeps = all * k / looks - all * (k - 1) / looks,
+                       expected = state_.substep + substeps;
+    const auto before = Clock::now();
+    const Status status = backend_.advance(substeps);
+    solver_seconds += seconds_since(before);
+    check(status, state_);
+    ParticleState next;
+    backend_.read(next);
+    if (next.substep != expected || next.size() != state_.size())
+      throw BackendError(fmt::format("{}: {} particles at substep {} instead of {} at {}",
+                                     backend_.info().name, next.size(), next.substep,
+                                     state_.size(), expected));
+    if (!finite(next)) check({Status::non_finite, -1, next.substep}, state_);
+    state_ = std::move(next);
+    if (k < looks) keep_worst(on_the_way, audit_.look(state_));
+  }
   ++frame_;
-  look(solver_seconds);
+  look(solver_seconds, on_the_way);
 }
 
 void Pour::checkpoint() {
