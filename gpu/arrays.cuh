@@ -23,6 +23,9 @@ struct Mailbox {
   int stale;                               // neighbors must be looked for anew
   float skin;                              // of the lists of this advance, m
   int fastest;                             // |v|² of the fastest particle, float bits
+  // Of lists that verify themselves, summed over substeps.
+  long long pairs, pairs_missed, wall_pairs, wall_pairs_missed;
+  unsigned long long missed;               // (substep << 32) | smallest id, where none may be; all ones: none
 };
 
 struct Arrays {

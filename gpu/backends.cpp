@@ -125,6 +125,7 @@ class DeviceBackend : public Backend {
   NeighborStats neighbor_stats() const override {
     NeighborStats stats = stats_;
     stats.rebuilds = solver_->rebuilds();
+    stats.verified = solver_->pair_totals();
     stats.device_bytes = static_cast<std::int64_t>(solver_->device_bytes());
     return stats;
   }

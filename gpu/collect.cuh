@@ -24,7 +24,9 @@ struct CollectPass {
     const int i = team.particle(0);
     const float4 own = sorted.position[i];
     const float reach = c.H + a.mailbox->skin;
-    Shelf shelf{i, xyz(own), reach * reach, lists.words(i, team.lane()), {}, 0};
+    // Without skin exactly what the passes take for a neighbor.
+    const float reach2 = reach * reach > c.H2 ? reach * reach : c.H2;
+    Shelf shelf{i, xyz(own), reach2, lists.words(i, team.lane()), {}, 0};
     candidates.around<periodic>(team.lane(), Team::lanes, shelf.x, a.poses_now(),
                                 [&](Candidates::Run run) DECANT_INLINE {
       if (run.listed)

@@ -48,6 +48,8 @@ class DeviceSolver {
   virtual StageTimes stage_times() const = 0;
   /// How often neighbors were looked for anew, since `load`.
   virtual std::int64_t rebuilds() const = 0;
+  /// What lists that verify themselves counted, since `load`.
+  virtual PairTotals pair_totals() const = 0;
   /// Device memory held.
   virtual std::size_t device_bytes() const = 0;
 };

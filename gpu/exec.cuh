@@ -186,6 +186,11 @@ DECANT_DEVICE void atomic_minimum(int* to, int value) { atomicMin(to, value); }
 DECANT_DEVICE void atomic_maximum(int* to, int value) { atomicMax(to, value); }
 /// Adds 1; returns what was there.
 DECANT_DEVICE int atomic_increment(int* to) { return atomicAdd(to, 1); }
+/// Two's complement adds alike with and without sign.
+DECANT_DEVICE void atomic_add(long long* to, int value) {
+  atomicAdd(reinterpret_cast<unsigned long long*>(to),
+            static_cast<unsigned long long>(static_cast<long long>(value)));
+}
 /// What another thread may be changing.
 DECANT_DEVICE int atomic_load(const int* from) { return *static_cast<const volatile int*>(from); }
 
@@ -205,6 +210,9 @@ inline void atomic_maximum(int* to, int value) {
   }
 }
 inline int atomic_increment(int* to) { return std::atomic_ref<int>(*to).fetch_add(1); }
+inline void atomic_add(long long* to, int value) {
+  std::atomic_ref<long long>(*to).fetch_add(value, std::memory_order_relaxed);
+}
 inline int atomic_load(const int* from) {
   return std::atomic_ref<int>(*const_cast<int*>(from)).load(std::memory_order_relaxed);
 }

@@ -11,6 +11,7 @@
 #include "gpu/collect.cuh"
 #include "gpu/grid_sources.cuh"
 #include "gpu/pipeline.cuh"
+#include "gpu/verify.cuh"
 
 #include <algorithm>
 #include <cmath>
@@ -73,6 +74,12 @@ class GridSearch {
                  [&] { build<periodic>(queue, a, geometry, laps); });
     else
       build<periodic>(queue, a, geometry, laps);
+    if (o_.verify)
+      with_lanes(lanes_, [&](auto lanes) {
+        verifier_.template count<decltype(lanes)::value>(
+            queue, c_, a, candidates(a), ListQuery<periodic>{{c_, a.base}, lists(a)},
+            o_.rebuild == 0, scratch_);
+      });
     if (keeps_pairs())
       run<periodic, facts>(queue, a, out, ListQuery<periodic>{{c_, a.base}, lists(a)});
     else
@@ -125,7 +132,7 @@ class GridSearch {
 
   std::size_t bytes() const {
     std::size_t sum = fluid_.bytes() + scratch_.bytes() + bucket_.bytes() + lists_.bytes() +
-                      counts_.bytes() + origin_.bytes() + built_.bytes() + boxes_.bytes() +
+                      counts_.bytes() + origin_.bytes() + built_.bytes() + boxes_.bytes() + verifier_.bytes() +
                       segments_.bytes() + wall_from_.bytes() + wall_from_id_.bytes() + wall_room_.bytes();
     for (const auto& grid : wall_grids_) sum += grid->bytes();
     for (const auto& near : near_) sum += near->bytes();
@@ -156,6 +163,7 @@ class GridSearch {
         make_cell_table(c_, reach_, low, high, std::max(4096.0, (large() ? 2.5 : 5.0) * n_));
     fluid_.prepare(queue, table, n_, scratch_);
     if (!reuses_) return;
+    if (o_.verify) verifier_.prepare(queue, table, n_, scratch_);
     origin_.resize(static_cast<std::size_t>(n_));
     built_.resize(static_cast<std::size_t>(containers));
     if (watch().trigger != Trigger::local) return;
@@ -397,6 +405,7 @@ class GridSearch {
   std::vector<std::unique_ptr<Buffer<int>>> near_;
   Buffer<DevicePose> built_;
   Buffer<DisplacementBox> boxes_;
+  ListVerifier verifier_;
 };
 
 /// The two backends made of it.

@@ -102,6 +102,10 @@ const std::map<std::string, std::map<std::string, Setter>>& known_options() {
            o.trigger = one_of<O::Trigger>(
                "trigger", v, {{"local", O::Trigger::local}, {"global", O::Trigger::global}});
          }},
+        {"verify",
+         [](O& o, const std::string& v) {
+           o.verify = one_of<bool>("verify", v, {{"off", false}, {"on", true}});
+         }},
         {"lanes", lanes},
         {"capacity", capacity},
         {"graphs", graphs}}},

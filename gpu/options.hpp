@@ -25,6 +25,7 @@ struct SolverOptions {
   int lanes = 0;        // threads a particle; 0: by the number of particles
   int capacity = 0;     // entries a list begins with; 0: by the skin
   bool graphs = true;   // substeps are recorded once and replayed
+  bool verify = false;  // list: counts in every substep what its lists miss (verify.cuh)
 };
 
 /// Options as the command line gives them, "key=value:key=value", for a backend that knows `keys`.

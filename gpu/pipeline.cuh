@@ -39,6 +39,7 @@ class Pipeline : public DeviceSolver {
     place_ghost();
     times_ = {};
     rebuilds_ = advances_ = 0;
+    totals_ = {};
     search_.load(queue_, c_, arrays(), wall_store_, problem.position);
     queue_.wait();
     loaded_ = true;
@@ -87,6 +88,10 @@ class Pipeline : public DeviceSolver {
     }
     watch_.read();
     rebuilds_ += mail.rebuilds;
+    totals_.pairs += mail.pairs;
+    totals_.missed += mail.pairs_missed;
+    totals_.wall_pairs += mail.wall_pairs;
+    totals_.wall_missed += mail.wall_pairs_missed;
     return status_of(mail);
   }
 
@@ -99,6 +104,7 @@ class Pipeline : public DeviceSolver {
 
   StageTimes stage_times() const override { return times_; }
   std::int64_t rebuilds() const override { return rebuilds_; }
+  PairTotals pair_totals() const override { return totals_; }
 
   std::size_t device_bytes() const override {
     return state_.bytes() + spare_position_.bytes() + spare_velocity_.bytes() + point_.bytes() +
@@ -251,7 +257,7 @@ class Pipeline : public DeviceSolver {
 
   /// No substep yet, nothing found, walls in place, and neighbors to be looked for.
   void begin() {
-    mailbox_.upload({Mailbox{~0ull, ~0ull, 0, 0, 0, 1, 0.0f, 0}});
+    mailbox_.upload({Mailbox{~0ull, ~0ull, 0, 0, 0, 1, 0.0f, 0, 0, 0, 0, 0, ~0ull}});
     const Arrays a = arrays();
     queue_.for_each(wall_store_.padded_total(), PosePass{a, wall_store_.walls, 0});
     search_.begin(queue_, a);
@@ -381,9 +387,10 @@ class Pipeline : public DeviceSolver {
 
   static Status status_of(const Mailbox& mail) {
     Status status;
-    const unsigned long long first = std::min(mail.non_finite, mail.escaped);
+    const unsigned long long first = std::min({mail.non_finite, mail.escaped, mail.missed});
     if (mail.non_finite != ~0ull) status.bits |= Status::non_finite;
     if (mail.escaped != ~0ull) status.bits |= Status::escaped;
+    if (mail.missed != ~0ull) status.bits |= Status::missed_pair;
     // Nobody grew what was too short: whatever came out of it is not to be used.
     if (mail.longest_list != 0) status.bits |= Status::capacity;
     if (first != ~0ull) {
@@ -412,6 +419,7 @@ class Pipeline : public DeviceSolver {
   Buffer<int> wall_id_, wall_container_;
   Buffer<float> wall_volume_;
   std::int64_t rebuilds_ = 0, advances_ = 0;
+  PairTotals totals_;
   StageTimes times_;
   Stopwatch watch_;
   Recording long_recording_, short_recording_;

@@ -26,7 +26,7 @@ struct BackendInfo {
 
 /// Trouble met on the way. A status that is not ok makes every result of the backend unusable.
 struct Status {
-  enum Bit : std::uint32_t { non_finite = 1, escaped = 2, capacity = 4 };
+  enum Bit : std::uint32_t { non_finite = 1, escaped = 2, capacity = 4, missed_pair = 8 };
   std::uint32_t bits = 0;
   std::int64_t particle = -1;  // smallest id concerned
   std::int64_t substep = -1;   // first substep it was seen after
@@ -47,10 +47,16 @@ struct StageTimes {
   Stage build, density, force, integrate;
 };
 
+/// Pairs within H, both directions of fluid pairs, and those that lists lacked; summed over substeps.
+struct PairTotals {
+  std::int64_t pairs = 0, missed = 0, wall_pairs = 0, wall_missed = 0;
+};
+
 struct NeighborStats {
   std::int64_t rebuilds = 0;
   std::int64_t device_bytes = 0;         // memory held; 0: not told
   double mean_fluid = 0, mean_wall = 0;  // neighbors a particle at the last evaluation
+  PairTotals verified;                   // of lists that verify themselves, since `load`
 };
 
 class Backend {

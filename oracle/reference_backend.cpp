@@ -99,6 +99,7 @@ std::string describe(const Status& status) {
   add(Status::non_finite, "non-finite value");
   add(Status::escaped, "particle outside the domain");
   add(Status::capacity, "neighbor capacity exceeded");
+  add(Status::missed_pair, "pair missed by a neighbor list");
   return what + ", particle " + std::to_string(status.particle) + ", substep " +
          std::to_string(status.substep);
 }

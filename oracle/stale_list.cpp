@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <tuple>
 
 namespace decant {
@@ -91,6 +92,16 @@ StaleList::StaleList(const Scene& scene, const Eigen::VectorXd& volumes, const I
   wide.support_ratio *= 1 + skin;
   find_neighbors(wide, fluid_, wall_, NeighborSearch::cells, listed_);
 }
+
+StaleList::StaleList(const Scene& scene, const Eigen::VectorXd& volumes, const Instant& built,
+                     Neighbors listed)
+    : scene_(scene),
+      volumes_(volumes),
+      skin_(std::numeric_limits<double>::quiet_NaN()),
+      substep_(built.state.substep),
+      fluid_(built.state.position),
+      wall_(built.walls.position),
+      listed_(std::move(listed)) {}
 
 Staleness StaleList::at(const Instant& now) const {
   const Separation separation(scene_.domain);

@@ -65,6 +65,9 @@ class StaleList {
  public:
   /// \param skin  share of H, >= 0
   StaleList(const Scene& scene, const Eigen::VectorXd& volumes, const Instant& built, double skin);
+  /// A given one, of unknown skin (NaN). \param listed  every list ascending
+  StaleList(const Scene& scene, const Eigen::VectorXd& volumes, const Instant& built,
+            Neighbors listed);
 
   /// What it misses at a later instant of the same run.
   Staleness at(const Instant& now) const;

@@ -2,6 +2,7 @@
 /// Recorded fixtures are still what the reference says, and backends conform on them and on random
 /// scenes nobody chose.
 #include "oracle/conform.hpp"
+#include "oracle/stale_list.hpp"
 #include "tests/backend_variants.hpp"
 #include "tests/random_scene.hpp"
 
@@ -155,33 +156,70 @@ TEST_P(Conformance, HoldsAllAroundTheWalls) {
     EXPECT_EQ(objections(*tested, answered(around_walls(recording, 1))), "") << recording;
 }
 
-/// How far apart two backends are after some substeps, in particle spacings.
-double apart_after(Backend& a, Backend& b, const Fixture& fixture, int substeps) {
-  ParticleState ends[2];
-  Backend* both[] = {&a, &b};
-  for (int k = 0; k < 2; ++k) {
-    both[k]->load(fixture.scene, sample_walls(fixture.scene), fixture.state);
-    EXPECT_TRUE(both[k]->advance(substeps).ok());
-    both[k]->read(ends[k]);
-  }
-  return (ends[0].position - ends[1].position).cwiseAbs().maxCoeff() /
-         fixture.scene.particle_spacing;
+/// What a list that verifies itself counts in some substeps. The status tells of promises not kept.
+PairTotals counted(const std::string& variant, const Fixture& fixture, int substeps,
+                   Status* status = nullptr) {
+  const auto list = test::make_variant(variant + ":verify=on", Executor::host);
+  list->load(fixture.scene, sample_walls(fixture.scene), fixture.state);
+  const Status seen = list->advance(substeps);
+  if (status) *status = seen;
+  return list->neighbor_stats().verified;
 }
 
 TEST(Lists, MissNothingWhileTheyAreWatchedAndMuchWhileTheyAreNot) {
-  const auto hash = test::make_variant("hash", Executor::host);
   constexpr int substeps = 40;
   const Fixture fixture = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-splash.h5");
-  for (const char* watched :
-       {"list", "list:trigger=local:skin=0.05", "list:build=all-pairs:skin=0.1"}) {
-    const auto list = test::make_variant(watched, Executor::host);
-    EXPECT_LT(apart_after(*hash, *list, fixture, substeps), 1e-4) << watched;
+  for (const char* watched : {"list", "list:trigger=local:skin=0.05",
+                              "list:build=all-pairs:skin=0.1", "list:skin=0.4"}) {
+    Status status;
+    const PairTotals all = counted(watched, fixture, substeps, &status);
+    EXPECT_TRUE(status.ok()) << watched << ": " << describe(status);
+    EXPECT_GT(all.pairs, 40 * 4000 * 20) << watched;
+    EXPECT_EQ(all.missed + all.wall_missed, 0) << watched;
   }
-  const auto wide = test::make_variant("list:skin=0.4", Executor::host);
-  EXPECT_LT(apart_after(*hash, *wide, fixture, substeps), 1e-4);
-  EXPECT_LT(wide->neighbor_stats().rebuilds, substeps / 2);
-  const auto stale = test::make_variant("list:rebuild=40:skin=0", Executor::host);
-  EXPECT_GT(apart_after(*hash, *stale, fixture, substeps), 1e-2);
+  const PairTotals stale = counted("list:rebuild=40:skin=0", fixture, substeps);
+  EXPECT_GT(stale.missed, stale.pairs / 100);
+  EXPECT_GT(stale.wall_missed, stale.wall_pairs / 100);
+}
+
+TEST(Lists, VerifiedCountWhatTheOracleCounts) {
+  for (const std::uint32_t seed : {2u, 3u, 5u, 8u}) {
+    const Fixture f = test::random_fixture(seed);
+    const Walls walls = sample_walls(f.scene);
+    const Eigen::VectorXd volumes = boundary_volumes<double>(f.scene, walls);
+    const StaleList built(f.scene, volumes, look_at(f.scene, walls, volumes, f.state), 0);
+    PairTotals expected;
+    for (int age = 0; age < 6; ++age) {
+      const auto list = test::make_variant("list:rebuild=6:skin=0", Executor::host);
+      list->load(f.scene, walls, f.state);
+      ASSERT_TRUE(list->advance(age).ok());
+      ParticleState state;
+      list->read(state);
+      const Staleness s = built.at(look_at(f.scene, walls, volumes, state));
+      expected.pairs += s.fluid.within;
+      expected.missed += s.fluid.missed;
+      expected.wall_pairs += s.wall.within;
+      expected.wall_missed += s.wall.missed;
+    }
+    const PairTotals got = counted("list:rebuild=6:skin=0", f, 6);
+    // fp32 may see a pair on the other side of H, from either end.
+    EXPECT_NEAR(got.pairs, expected.pairs, 4) << seed;
+    EXPECT_NEAR(got.missed, expected.missed, 4) << seed;
+    EXPECT_NEAR(got.wall_pairs, expected.wall_pairs, 4) << seed;
+    EXPECT_NEAR(got.wall_missed, expected.wall_missed, 4) << seed;
+    EXPECT_GT(got.missed, 20) << seed;
+  }
+}
+
+TEST(Lists, MissNothingInRandomScenes) {
+  for (std::uint32_t seed = 1; seed <= 60; ++seed) {
+    const Fixture f = test::random_fixture(seed);
+    Status status;
+    const PairTotals all =
+        counted(seed % 2 ? "list" : "list:trigger=local:skin=0.1", f, 12, &status);
+    EXPECT_EQ(status.bits & Status::missed_pair, 0u) << seed << ": " << describe(status);
+    EXPECT_EQ(all.missed + all.wall_missed, 0) << seed;
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Backends, Conformance,

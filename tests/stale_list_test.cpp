@@ -1,8 +1,10 @@
 /// \file
 /// Stale lists: what is missed is counted right, nothing is missed where the bound says so, and errors
 /// grow with the powers that the kernels' edges give them.
+#include "oracle/list_theory.hpp"
 #include "oracle/stale_list.hpp"
 #include "tests/random_scene.hpp"
+#include "tools/drift/power_fit.hpp"
 
 #include <gtest/gtest.h>
 
@@ -163,6 +165,93 @@ TEST_P(DeficitGrowth, HasThePowersOfTheKernelsEdge) {
 INSTANTIATE_TEST_SUITE_P(Of, DeficitGrowth,
                          testing::Values(KernelFamily::cubic_spline, KernelFamily::wendland_c2,
                                          KernelFamily::mueller2003));
+
+TEST_P(DeficitGrowth, HasThosePowersWithinTheFitsOwnConfidence) {
+  std::array<std::vector<std::pair<double, double>>, 3> points;
+  double moved = 0.006;
+  for (std::uint32_t seed = 1; seed <= 10; ++seed, moved *= 1.25) {
+    std::srand(seed);
+    Problem p = gas(GetParam());
+    // With it, mueller2003's Laplacian ends a power lower, but small beside the pressure of a gas.
+    p.scene.fluid.viscosity = 0;
+    const double H = p.scene.support_radius();
+    const StaleList list = p.list(0);
+    p.state.position += moved * H * random_steps(p.state.size(), 1, seed);
+    for (double& x : p.state.position.reshaped()) x -= 0.2 * std::floor(x / 0.2);
+    const Staleness s = list.at(p.look());
+    points[0].emplace_back(moved, static_cast<double>(s.fluid.missed));
+    points[1].emplace_back(moved, s.density.mean);
+    points[2].emplace_back(moved, s.acceleration.mean);
+  }
+  Scene scene = gas(GetParam()).scene;
+  scene.fluid.viscosity = 0;
+  const auto expected = edge_powers(scene);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const PowerFit fit = fit_power(points[k]);
+    EXPECT_TRUE(fit.admits(expected[k])) << k << ": " << fit.power << " ± " << fit.confidence;
+    EXPECT_LT(fit.confidence, 0.5) << k;  // tells one power from the next
+  }
+}
+
+// The gas has no order and its speeds stay, so theory leaves nothing out.
+TEST_P(DeficitGrowth, IsWhatTheoryExpectsFromSpeedsAlone) {
+  std::srand(11);
+  Problem p = gas(GetParam());
+  const double H = p.scene.support_radius();
+  p.state.velocity = random_steps(p.state.size(), 1, 3);
+  const Instant start = p.look();
+  const PairsNearEdge near = pairs_near_edge(p.scene, p.volumes, start);
+  EXPECT_NEAR(near.neighbors, 8000 / 0.008 * 4 / 3 * M_PI * H * H * H, 0.5);
+  for (const double skin : {0.0, 0.03}) {
+    const StaleList list(p.scene, p.volumes, start, skin);
+    const double seconds = 0.1 * H;
+    p.state.position = start.state.position + seconds * start.state.velocity;
+    for (double& x : p.state.position.reshaped()) x -= 0.2 * std::floor(x / 0.2);
+    const Staleness s = list.at(p.look());
+    const ExpectedDrift expected = expected_drift(p.scene, near, seconds, skin);
+    const double missed =
+        static_cast<double>(s.fluid.missed) / static_cast<double>(s.fluid.within);
+    EXPECT_NEAR(expected.missed_share / missed, 1, 0.1) << skin;
+    EXPECT_NEAR(expected.density_rms / s.density.relative_rms, 1, 0.2) << skin;
+    EXPECT_NEAR(expected.acceleration_rms / s.acceleration.relative_rms, 1, 0.35) << skin;
+    p.state.position = start.state.position;
+  }
+}
+
+TEST(ListTheory, FindsTheSkinThatKeepsATolerance) {
+  std::srand(2);
+  Problem p = gas(KernelFamily::cubic_spline);
+  const PairsNearEdge near = pairs_near_edge(p.scene, p.volumes, p.look());
+  const double seconds = 0.2 * p.scene.support_radius();
+  double before = 1;
+  for (const double tolerance : {1e-5, 1e-4, 1e-3, 1e-2}) {
+    const double skin = skin_for(p.scene, near, seconds, tolerance);
+    EXPECT_LT(skin, before);
+    EXPECT_LE(expected_drift(p.scene, near, seconds, skin).acceleration_rms, tolerance);
+    EXPECT_GT(expected_drift(p.scene, near, seconds, 0.99 * skin).acceleration_rms, tolerance);
+    before = skin;
+  }
+  EXPECT_EQ(skin_for(p.scene, near, 0, 1e-9), 0);
+  EXPECT_EQ(expected_drift(p.scene, near, seconds, 1).missed_share, 0);
+}
+
+TEST(PowerFit, FindsThePowerAndHowSureItIs) {
+  EXPECT_NEAR(fit_power({{1, 3}, {2, 24}, {3, 81}, {4, 192}}).power, 3, 1e-12);
+  EXPECT_NEAR(fit_power({{1, 3}, {2, 24}, {3, 81}, {4, 192}}).confidence, 0, 1e-6);
+  EXPECT_TRUE(std::isnan(fit_power({{1, 1}, {2, 2}, {3, 0}, {4, 4}}).power));
+  // Student's quantile for 8 degrees of freedom is 2.306.
+  std::vector<std::pair<double, double>> points;
+  double xx = 0, rest = 0;
+  for (int k = 0; k < 10; ++k) {
+    const double x = k - 4.5, e = k % 2 ? 0.1 : -0.1;
+    points.emplace_back(std::exp(x), std::exp(2 * x + e));
+    xx += x * x;
+  }
+  const PowerFit fit = fit_power(points);
+  for (int k = 0; k < 10; ++k)
+    rest += std::pow((2 - fit.power) * (k - 4.5) + (k % 2 ? 0.1 : -0.1), 2);
+  EXPECT_NEAR(fit.confidence, 2.306 * std::sqrt(rest / 8 / xx), 1e-3 * fit.confidence);
+}
 
 TEST(StaleList, OfAWallThatTurnedShowsInTheWallsTermsAlone) {
   Fixture f = random_fixture(1);

@@ -3,7 +3,7 @@
 
     check_schema.py FILE.h5 …
 
-Reads the table in oracle/fixture-format.md, report-format.md, results-format.md or validation-format.md and compares
+Reads the table in oracle/fixture-format.md, report-format.md, results-format.md, validation-format.md or drift-format.md and compares
 names, dtypes, shapes and units with what stands in the file. Exit status: 0 as documented, 1 not,
 2 bad input.
 """
@@ -138,11 +138,15 @@ def check_report(check, rows):
         check.complain(f"/summary/{name}", "not in the document")
 
 
-def check_validation(check, rows):
-    file = check.file
+def check_columns(check, rows):
     for path, dtype, shape, unit, where in rows:
         if where == "all":
             check.row(path, dtype, shape, unit)
+
+
+def check_validation(check, rows):
+    file = check.file
+    check_columns(check, rows)
     for name in file.get("curves", {}):
         for path, dtype, shape, unit, where in rows:
             if where == "curve":
@@ -188,6 +192,8 @@ def complaints_about(path):
             check_fixture(check, rows_of(FORMATS / "fixture-format.md"))
         elif "decant_validation" in file.attrs:
             check_validation(check, rows_of(FORMATS / "validation-format.md"))
+        elif "decant_drift" in file.attrs:
+            check_columns(check, rows_of(FORMATS / "drift-format.md"))
         elif "decant_report" in file.attrs:
             check_report(check, rows_of(FORMATS / "report-format.md"))
         else:

@@ -35,6 +35,10 @@ void add_bench_command(CLI::App& app, int& exit_status);
 /// `decant export`: what a solver in another language needs of a fixture.
 void add_export_command(CLI::App& app, int& exit_status);
 
+/// `decant drift`: what neighbor lists miss that are rebuilt every N substeps. Exit status 1 where
+/// --recommend finds nothing.
+void add_drift_command(CLI::App& app, int& exit_status);
+
 /// `decant validate`: the solver against cases whose answer is known. Exit status 1 where a gate is not
 /// met.
 void add_validate_command(CLI::App& app, int& exit_status);

@@ -204,12 +204,7 @@ PourResult Pour::run() {
 
 void Pour::start() {
   state_ = initial_state(scene_);
-  if (options_.perturbation != 0) {
-    std::mt19937 random(options_.perturbation);
-    for (double& x : state_.position.reshaped())
-      x *= 1 + 0x1p-22 * (2.0 * static_cast<double>(random()) / 4294967295.0 - 1);
-    state_.quantise();
-  }
+  if (options_.perturbation != 0) state_ = disturbed_start(state_, options_.perturbation);
   layout_ = frame_layout(scene_, state_.size());
   check_room(options_, files_, layout_, 0);
   backend_.load(scene_, walls_, state_);
@@ -369,6 +364,14 @@ void Pour::dump(const std::string& trouble, const ParticleState& good) {
 }
 
 }  // namespace
+
+ParticleState disturbed_start(ParticleState state, std::uint32_t seed) {
+  std::mt19937 random(seed);
+  for (double& x : state.position.reshaped())
+    x *= 1 + 0x1p-22 * (2.0 * static_cast<double>(random()) / 4294967295.0 - 1);
+  state.quantise();
+  return state;
+}
 
 PourResult pour(const Scene& scene, Backend& backend, const PourOptions& options) {
   return Pour(scene, backend, options).run();

@@ -8,6 +8,7 @@
 
 #include "oracle/backend.hpp"
 #include "reference/scene.hpp"
+#include "reference/state.hpp"
 #include "tools/timeline.hpp"
 
 #include <cstdint>
@@ -21,9 +22,7 @@ struct PourOptions {
   bool csv = false, resume = false, quiet = false;
   double checkpoint_seconds = 30;  // s, wall time between checkpoints; 0: at every frame
   std::function<bool()> stop;      // asked after every frame; true: leave a checkpoint and return
-  /// Not 0: every coordinate of the start is changed by a random part, up to 2⁻²², seeded with this. Pours
-  /// that differ in nothing else show how far apart their ends may be.
-  std::uint32_t perturbation = 0;
+  std::uint32_t perturbation = 0;  // not 0: from disturbed_start with this seed
 };
 
 struct PourResult {
@@ -38,6 +37,10 @@ struct PourResult {
 /// last good state to failed-state.h5 in the folder; std::runtime_error where a file cannot be
 /// written.
 PourResult pour(const Scene& scene, Backend& backend, const PourOptions& options);
+
+/// Every coordinate changed by a random part, up to 2⁻²². Pours that differ in nothing else show how far
+/// apart their ends may be.
+ParticleState disturbed_start(ParticleState state, std::uint32_t seed);
 
 /// The scene written in `frames` frames over the same time. Substeps that the scene sets become as
 /// many as keep each of them no longer than it was; derived ones are derived anew.

@@ -1,0 +1,185 @@
+/// \file
+/// Drift against rebuild interval. From a state a window of substeps is run, and lists that are rebuilt
+/// every N substeps with a skin are held to all pairs at every substep of it. Then the same lists are
+/// timed, and followed to see how far they lead the fluid astray. Of a scene the whole pour is looked at.
+#pragma once
+
+#include "oracle/backend.hpp"
+#include "oracle/ensemble.hpp"
+#include "oracle/fixture.hpp"
+#include "oracle/list_theory.hpp"
+#include "oracle/stale_list.hpp"
+#include "tools/drift/power_fit.hpp"
+
+#include <array>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace decant {
+
+inline constexpr double not_measured = std::numeric_limits<double>::quiet_NaN();
+
+/// When a list is rebuilt, and how much further than H it reaches.
+struct ListChoice {
+  int interval = 1;  // substeps between rebuilds; 0: before a pair can be missed; −1: as a series tells
+  double skin = 0;   // share of H; NaN for intervals below 1
+  bool derived = false;  // the skin is the one that theory asks for (list_theory.hpp)
+
+  std::string options() const;  // of the backend `list`
+};
+
+struct DriftPlan {
+  std::vector<ListChoice> lists;  // intervals >= 1
+  int window = 50;                // substeps
+  bool timed = true;              // false: no list is run to be timed and followed
+};
+
+/// Every interval with every skin.
+std::vector<ListChoice> all_lists(const std::vector<int>& intervals,
+                                  const std::vector<double>& skins);
+
+/// One list at one substep of the window.
+struct DriftSample {
+  ListChoice list;
+  std::int64_t substep;  // of the window, or of the scene
+  Staleness stale;
+  bool proved;           // complete, by displacements
+};
+
+/// One list over the window, and what it costs.
+struct DriftRow {
+  std::string fixture;
+  ListChoice list;
+  double missed_share = 0, worst_missed_share = 0;  // of the pairs within H; mean over the window, largest
+  double wall_missed_share = 0;                     // mean, of the wall's pairs
+  double deepest = 0;                               // largest (H − r)/H of a missed pair
+  double wasted_share = 0;                          // of the listed pairs, not within H; mean
+  double density_score = 0, acceleration_score = 0;  // largest over the window
+  double density_rms = 0, pressure_rms = 0, acceleration_rms = 0, wall_acceleration_rms = 0;
+  // Substeps after a rebuild at which a pair is first missed, and until which displacements prove that
+  // none is; the earliest over the window's lists, the interval itself where there is none.
+  int first_miss = 1, proved_until = 1;
+  // What the backend's own lists miss in the same window, mean: counted on the device (list:verify=on).
+  double own_missed_share = not_measured, own_wall_missed_share = not_measured;
+  ExpectedDrift expected;  // by theory, from the window's first state, at the list's last substep
+  double substep_us = not_measured, rebuild_every = not_measured;
+  double deviation = not_measured;  // RMS of positions after the ensemble's substeps / dx
+  double deviation_over_ensemble = not_measured;  // and over the ensemble's mean
+  double energy_drift = not_measured;             // J, beside lists that are complete
+  double momentum_drift = not_measured;           // kg m/s, the same
+};
+
+/// Longest interval without a miss, by skin; the window's length stands for at least as much.
+struct SafeInterval {
+  std::string fixture;
+  double skin;
+  int measured;           // no list of the window missed a pair at a younger age
+  int proved;             // nor could it have, by the displacements seen
+  int expected;           // by the displacement bound, from the speeds of the window's first state
+  int expected_relative;  // from how fast the pairs near H approach
+};
+
+/// What happened between the first and last frame of a pour by one list, beside complete lists.
+struct WholePour {
+  std::string fixture;
+  ListChoice list;
+  std::uint32_t perturbation = 0;  // not 0: complete lists, and a start disturbed by rounding
+  std::string trouble;             // of the backend; the rest is then NaN
+  std::array<double, 5> share_at{};      // of the mass, by Place, at the end
+  std::int64_t inside = 0;               // particles seen inside a solid, largest count
+  double kinetic_peak = not_measured, energy_lost = not_measured;  // J
+  double energy_drift = not_measured;    // RMS over the pour, over the energy lost
+  double momentum_drift = not_measured;  // RMS over the pour, over the RMS of the momentum
+  // Share of the pairs within H that its lists lacked over the pour, counted on the device.
+  double missed_share = not_measured, wall_missed_share = not_measured;
+  double rebuild_every = not_measured;  // substeps
+};
+
+struct DriftResult {
+  std::string fixture;
+  double particle_spacing = 0, support_radius = 0;  // m
+  std::int64_t particles = 0;
+  std::vector<DriftSample> samples;
+  std::vector<DriftRow> rows;
+  std::vector<SafeInterval> safe;
+  /// Powers with which what a list without skin misses grows with how far neighbors moved against each
+  /// other since the build: missed pairs, mean deficit of density, of acceleration. Beside them theory's.
+  std::array<PowerFit, 3> powers;
+  std::array<double, 3> edge_powers{};
+  double measured_seconds = 0, run_seconds = 0;  // in all; of the backend's part
+};
+
+/// One list at one moment of a pour, at the last substep before it would be rebuilt.
+struct PourMoment {
+  double time;  // s
+  DriftSample sample;
+};
+
+struct PourDrift {
+  std::string fixture;
+  std::vector<PourMoment> moments;
+  std::vector<WholePour> whole;
+};
+
+/// Makes a list backend of these options: ("rebuild=5:skin=0.1"); empty: the default.
+using ListMaker = std::function<std::unique_ptr<Backend>(const std::string& options)>;
+
+/// Throws BackendError where a backend reports trouble, as the functions below do.
+void require_ok(const Backend& backend, const Status& status);
+
+/// Calls work(k) for k < n on all cores; the first exception is thrown when all are done.
+void in_parallel(int n, const std::function<void(int)>& work);
+
+/// Means and worst of one list's samples.
+DriftRow summed_up(const std::string& fixture, const std::vector<DriftSample>& samples);
+
+/// Measures one window. \param fixture  its recorded fields are not needed
+DriftResult measure_drift(const Fixture& fixture, const DriftPlan& plan,
+                          const ListMaker& make_list);
+
+/// Times every list from the fixture's state and follows it beside complete ones.
+void time_and_follow(const Fixture& fixture, const Walls& walls, int window,
+                     const ListMaker& make_list, DriftResult& result);
+
+/// For each interval the smallest skin that theory expects to stay within the tolerance in every one of
+/// these states, rounded up to 0.01.
+std::vector<ListChoice> derived_lists(const std::vector<Fixture>& fixtures,
+                                      const std::vector<int>& intervals, double tolerance);
+
+/// Runs a scene with complete lists; at `looks` moments what each list would miss just before its rebuild,
+/// and the state at each of `phases`.
+PourDrift along_pour(const Scene& scene, const DriftPlan& plan, int looks,
+                     const ListMaker& make_list, std::vector<Fixture>& phases);
+
+/// The whole pour by complete lists, by `disturbed` more whose start differs by rounding, and by each list.
+std::vector<WholePour> whole_pours(const Scene& scene, const DriftPlan& plan, int disturbed,
+                                   const ListMaker& make_list);
+
+/// A run by another program: states, and the list that it used at each. Layout in
+/// oracle/list-series-format.md. Throws InputError.
+DriftResult measure_series(const Fixture& fixture, const std::filesystem::path& series);
+
+/// The cheapest list whose acceleration stays within half of `tolerance` (relative RMS) at every substep of
+/// every window measured: states between the measured ones may be worse. Null where none is.
+struct Recommendation {
+  ListChoice list;
+  double worst_error, expected_error, substep_us, adaptive_us;
+  double next_us = not_measured;  // of the list that errs least among the faster ones
+  double next_error = not_measured;
+};
+std::unique_ptr<Recommendation> recommend(const std::vector<DriftResult>& results,
+                                          double tolerance);
+
+/// Tables for people.
+std::string drift_table(const std::vector<DriftResult>& results);
+std::string pour_table(const std::vector<PourDrift>& pours);
+
+/// Layout in oracle/drift-format.md.
+void write_drift(const std::filesystem::path& file, const std::vector<DriftResult>& results,
+                 const std::vector<PourDrift>& pours, const BackendInfo& backend);
+
+}  // namespace decant
