@@ -27,7 +27,7 @@ DECANT_DEVICE Clearance revolved_clearance(const Edge* edges, int count, Float3 
   const Radius axis = radius(x.x * x.x + x.y * x.y);
   const float r = axis.r, z = x.z;
   float best = 3.0e38f, away_r = 0.0f, away_z = 0.0f, face_r = 0.0f, face_z = 0.0f;
-  bool inside = false;
+  bool inside = false, at_corner = false;
   for (int k = 0; k < count; ++k) {
     const Edge e = edges[k];
     const float pr = r - e.r0, pz = z - e.z0;
@@ -40,6 +40,7 @@ DECANT_DEVICE Clearance revolved_clearance(const Edge* edges, int count, Float3 
       away_z = az;
       face_r = e.dz;  // the solid is on the left, so outward is right
       face_z = -e.dr;
+      at_corner = !(s > 0.0f && s < 1.0f);
     }
     // Even–odd count of the outline beyond r at this height.
     if ((e.z0 > z) != (e.z1 > z) && pr < pz * e.slope) inside = !inside;
@@ -47,7 +48,8 @@ DECANT_DEVICE Clearance revolved_clearance(const Edge* edges, int count, Float3 
   const Radius away = radius(best);
   const float d = away.r, sign = inside ? -1.0f : 1.0f;
   float nr, nz;
-  if (d > 1e-6f * (r + fabsf(z))) {
+  // Beside an edge its own normal is exact, where a difference of near points is not.
+  if (at_corner && d > 1e-6f * (r + fabsf(z))) {
     nr = sign * away_r * away.inverse;
     nz = sign * away_z * away.inverse;
   } else {

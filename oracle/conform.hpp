@@ -48,8 +48,11 @@ struct Judgement {
 std::string evaluate_oracle(const Scene& scene, const ParticleState& state, Fields& fields,
                             ConditionSums& condition);
 
+/// Why no backend can pass where this is the answer; empty for a sound one.
+std::string weakness(const OracleAnswer& answer);
+
 /// Evaluates the oracle on the fixture's state, as far as these checks need it. Throws InputError where
-/// the recorded fields are not what this build's reference gives within the tolerances scaled from 2⁻²⁴
+/// the recorded fields, if there are any, are not what this build's reference gives within the tolerances scaled from 2⁻²⁴
 /// to 2⁻⁵³.
 /// \param look_every  substeps between two looks at a run, for containment and mass; 0: after half of it,
 ///                    half of the rest, and so on

@@ -52,6 +52,23 @@ const SubstepOutcome& nearest_outcome(const std::vector<SubstepOutcome>& outcome
   return *nearest;
 }
 
+/// Positions as the images nearest to the oracle's: where fp32 cannot tell on which side of a period a
+/// particle came back in, both are the same point. One that was not put back into its period stays.
+ParticleState nearest_images(ParticleState got, const Scene& scene, const SubstepAnswer& answer) {
+  for (int a = 0; a < 3; ++a) {
+    if (!scene.domain.periodic[static_cast<std::size_t>(a)]) continue;
+    const double low = scene.domain.min[a], high = scene.domain.max[a], period = high - low,
+                 slack = 4 * unit_roundoff * (period + std::abs(low));
+    for (Eigen::Index i = 0; i < got.position.cols(); ++i) {
+      double& x = got.position(a, i);
+      if (!(x >= low - slack && x <= high + slack)) continue;
+      const double expected = answer.outcomes[static_cast<std::size_t>(i)].front().position[a];
+      x -= period * std::round((x - expected) / period);
+    }
+  }
+  return got;
+}
+
 }  // namespace
 
 const Answered& all_answered() {
@@ -93,10 +110,13 @@ void judge_evaluation(const Fields& got, const Answered& answered, const Judgeme
   judge_accelerations("evaluation", got, answered, oracle.own, oracle.own_float, sheet);
 }
 
-void judge_substep(const ParticleState& got, const Answered& answered, const Fixture& fixture,
+void judge_substep(const ParticleState& answer_of_backend, const Answered& answered, const Fixture& fixture,
                    const Judgement& oracle, Sheet& sheet) {
   const SubstepAnswer& answer = oracle.substep;
   const auto n = static_cast<Eigen::Index>(answer.outcomes.size());
+  const ParticleState got = answer_of_backend.position.cols() == n
+                                ? nearest_images(answer_of_backend, fixture.scene, answer)
+                                : answer_of_backend;
   Eigen::Matrix3Xd x(3, n), v(3, n), tau_x(3, n), tau_v(3, n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const SubstepOutcome& nearest =

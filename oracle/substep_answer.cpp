@@ -114,7 +114,6 @@ class Substep {
       const double low = scene_.domain.min[c], period = scene_.domain.max[c] - low;
       const double turns = (p.x[c] - low) / period;
       p.tau_x[c] += 4 * u * (period + std::abs(low));
-      if (std::abs(turns - std::round(turns)) <= p.tau_x[c] / period) p.ambiguous = true;
       p.x[c] -= period * std::floor(turns);
     }
   }

@@ -18,7 +18,8 @@ struct SubstepAnswer {
   /// Per particle the oracle's own outcome, then those with its undecidable contacts decided
   /// otherwise.
   std::vector<std::vector<SubstepOutcome>> outcomes;
-  /// Particles left out: the nearest face cannot be told, or more than three contacts are open.
+  /// Particles left out: the nearest face cannot be told, or more than three contacts are open. Which
+  /// side of a period a particle comes back in on does not matter: positions are compared by images.
   std::vector<bool> ambiguous;      // N
   std::int64_t most_ambiguous = 0;  // 2 % of the particles, and ten
 };

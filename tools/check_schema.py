@@ -3,8 +3,8 @@
 
     check_schema.py FILE.h5 …
 
-Reads the table in oracle/fixture-format.md, report-format.md, results-format.md, validation-format.md or drift-format.md and compares
-names, dtypes, shapes and units with what stands in the file. Exit status: 0 as documented, 1 not,
+Reads the table in oracle/fixture-format.md, or that of reports, results, validations, drift or fuzzing,
+and compares names, dtypes, shapes and units with what stands in the file. Exit status: 0 as documented, 1 not,
 2 bad input.
 """
 
@@ -194,6 +194,8 @@ def complaints_about(path):
             check_validation(check, rows_of(FORMATS / "validation-format.md"))
         elif "decant_drift" in file.attrs:
             check_columns(check, rows_of(FORMATS / "drift-format.md"))
+        elif "decant_fuzz" in file.attrs:
+            check_columns(check, rows_of(FORMATS / "fuzz-format.md"))
         elif "decant_report" in file.attrs:
             check_report(check, rows_of(FORMATS / "report-format.md"))
         else:

@@ -35,6 +35,9 @@ void add_bench_command(CLI::App& app, int& exit_status);
 /// `decant export`: what a solver in another language needs of a fixture.
 void add_export_command(CLI::App& app, int& exit_status);
 
+/// `decant fuzz`: random problems, held to properties. Exit status 1 where one does not hold.
+void add_fuzz_command(CLI::App& app, int& exit_status);
+
 /// `decant drift`: what neighbor lists miss that are rebuilt every N substeps. Exit status 1 where
 /// --recommend finds nothing.
 void add_drift_command(CLI::App& app, int& exit_status);

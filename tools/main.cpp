@@ -46,6 +46,7 @@ int main(int argc, char** argv) {
   add_export_command(app, status);
   add_diff_command(app, status);
   add_bench_command(app, status);
+  add_fuzz_command(app, status);
   add_drift_command(app, status);
   add_validate_command(app, status);
   add_info_command(app, status);

@@ -8,11 +8,11 @@
 #include "tools/commands.hpp"
 #include "tools/pour.hpp"
 #include "tools/progress.hpp"
+#include "tools/stop_signal.hpp"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <csignal>
 #include <memory>
 #include <optional>
 #include <string>
@@ -37,36 +37,6 @@ constexpr const char* footer =
     "\n"
     "Example:\n"
     "  decant pour fixtures/scenes/pour-4k.json --out build/pour-4k --frames 100";
-
-volatile std::sig_atomic_t caught_signal = 0;
-
-extern "C" void on_signal(int signal) {
-  caught_signal = signal;
-  std::signal(signal, SIG_DFL);
-}
-
-/// Ctrl-C and a polite kill set `caught_signal` for as long as this lives.
-class SignalGuard {
- public:
-  SignalGuard() {
-    caught_signal = 0;
-    struct sigaction action {};
-    action.sa_handler = on_signal;
-    action.sa_flags = SA_RESTART;
-    sigaction(SIGINT, &action, &before_int_);
-    sigaction(SIGTERM, &action, &before_term_);
-  }
-  ~SignalGuard() {
-    sigaction(SIGINT, &before_int_, nullptr);
-    sigaction(SIGTERM, &before_term_, nullptr);
-  }
-  SignalGuard(const SignalGuard&) = delete;
-  SignalGuard& operator=(const SignalGuard&) = delete;
-
- private:
-  struct sigaction before_int_ {
-  }, before_term_{};
-};
 
 Scene scene_of(const PourArguments& arguments) {
   const auto at_least_one = [](const char* option, std::int64_t value, std::int64_t most) {
@@ -166,14 +136,14 @@ int run(PourArguments& arguments) {
   const auto backend =
       choose_backend(arguments.flags.applied_to(arguments.backend), arguments.executor);
   arguments.flags.require_used();
-  const SignalGuard guard;
+  const StopSignal signal;
   PourOptions options;
   options.out = arguments.out;
   options.csv = arguments.csv;
   options.perturbation = arguments.perturbation;
   options.resume = arguments.resume;
   options.quiet = arguments.quiet;
-  options.stop = [] { return caught_signal != 0; };
+  options.stop = [] { return StopSignal::caught() != 0; };
   const PourResult result = pour(scene, *backend, options);
 
   const BackendInfo info = backend->info();
@@ -182,7 +152,7 @@ int run(PourArguments& arguments) {
     if (!arguments.quiet)
       fmt::print(stderr, "stopped after frame {} of {}; the same command with --resume goes on\n",
                  result.frame, scene.schedule.frames);
-    return 128 + caught_signal;
+    return 128 + StopSignal::caught();
   }
   if (!arguments.json && !arguments.quiet) print(result, info, scene);
   const bool conforms = result.summary.balanced() && !result.summary.penetrated();

@@ -6,6 +6,7 @@
 #include "gpu/backends.hpp"
 #include "gpu/fault.hpp"
 #include "oracle/conform.hpp"
+#include "tests/faults/fuzz_faults.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -29,6 +30,15 @@ namespace gpu::cuda {
 void choose_fault(int number);
 }
 #endif
+
+void choose_fault(Executor executor, int number) {
+  gpu::fault_on_host = number;
+#if DECANT_HAS_CUDA
+  if (executor == Executor::cuda) gpu::cuda::choose_fault(number);
+#else
+  (void)executor;
+#endif
+}
 
 namespace {
 
@@ -57,20 +67,11 @@ void say(const CheckRow& row, std::ostream& out) {
   out << row.check << '\t' << row.field << '\t' << row.score << '\n';
 }
 
-void choose(Executor executor, int number) {
-  gpu::fault_on_host = number;
-#if DECANT_HAS_CUDA
-  if (executor == Executor::cuda) gpu::cuda::choose_fault(number);
-#else
-  (void)executor;
-#endif
-}
-
 /// In the child: judges and writes the failing rows to `to`.
 void judge_into(int to, const Trial& trial, Executor executor, const Prepared& p) {
   const auto colon = trial.backend.find(':');
   const auto options = colon == std::string::npos ? "" : trial.backend.substr(colon + 1);
-  choose(executor, trial.number);
+  choose_fault(executor, trial.number);
   const auto backend = make_backend(trial.backend.substr(0, colon), executor, options);
   std::ostringstream out;
   for (const CheckRow& row : judge(*backend, p.fixture, p.oracle, trial.checks)) say(row, out);
@@ -196,6 +197,8 @@ struct Settings {
   std::vector<std::string> only;
   int jobs = 2;
   bool verbose = false;
+  std::int64_t fuzz = 0;  // problems at most; 0: the catalogue's own fixtures
+  std::uint64_t first_seed = 1;
 };
 
 int finish(const Settings& s, const std::string& table, bool passes) {
@@ -354,6 +357,12 @@ int run(const Settings& s) {
   std::ifstream(s.list) >> faults;
   // One thread a process; nobody has threads when processes split off.
   omp_set_num_threads(1);
+  if (s.fuzz > 0) {
+    bool all_found = false;
+    const std::string table =
+        fuzz_faults(faults, executor, s.jobs, s.fuzz, s.first_seed, all_found);
+    return finish(s, table, all_found);
+  }
   const bool mutations = !faults.empty() && !faults[0].contains("check");
   return mutations ? run_mutations(s, faults, executor) : run_catalogue(s, faults, executor);
 }
@@ -370,6 +379,8 @@ int main(int argc, char** argv) {
   app.add_option("--jobs", s.jobs, "processes at a time")->capture_default_str();
   app.add_option("--only", s.only, "names of faults");
   app.add_option("--equivalent", s.equivalent, "mutations that change nothing, with reasons");
+  app.add_option("--fuzz", s.fuzz, "find each fault by fuzzing alone, in so many problems at most");
+  app.add_option("--seed", s.first_seed, "of the first problem");
   app.add_flag("--verbose", s.verbose, "say how far it is");
   app.add_option("--out", s.out, "write the table");
   CLI11_PARSE(app, argc, argv);

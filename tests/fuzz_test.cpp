@@ -1,0 +1,186 @@
+/// \file
+/// Fuzzing itself: problems are sound and of all kinds, faults are found and shrunk, campaigns are the
+/// same however they are run.
+#include "tools/fuzz/campaign.hpp"
+
+#include "oracle/conform.hpp"
+#include "oracle/hdf5_io.hpp"
+#include "oracle/reference_backend.hpp"
+#include "reference/error.hpp"
+#include "reference/scene_checks.hpp"
+#include "tests/edited_reference.hpp"
+#include "tests/falling_points.hpp"
+#include "tests/python.hpp"
+#include "tools/backend_choice.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+
+namespace decant::fuzz {
+namespace {
+
+std::set<std::string> all_properties() {
+  std::set<std::string> names;
+  for (const Property& p : properties()) names.insert(p.name);
+  return names;
+}
+
+std::unique_ptr<Backend> on_host(const std::string& choice) { return choose_backend(choice, "host"); }
+
+Settings settings_of(std::int64_t cases, const std::set<std::string>& names) {
+  Settings s;
+  s.backends = {"hash"};
+  s.properties = names;
+  s.cases = cases;
+  return s;
+}
+
+TEST(Genomes, AreTheSameForASeedAndOthersForTheNext) {
+  for (std::uint64_t seed = 1; seed < 200; ++seed) {
+    EXPECT_EQ(random_genome(seed), random_genome(seed));
+    EXPECT_FALSE(random_genome(seed) == random_genome(seed + 1)) << seed;
+  }
+}
+
+TEST(Genomes, MakeSoundScenes) {
+  for (std::uint64_t seed = 1; seed <= 500; ++seed) {
+    const Fixture f = problem_of(random_genome(seed), "fuzz");
+    EXPECT_NO_THROW(check_scene(f.scene, "fuzz")) << seed;
+    ParticleState rounded = f.state;
+    rounded.quantise();
+    EXPECT_EQ(rounded.position, f.state.position) << seed;
+  }
+}
+
+TEST(Genomes, AreOfAllKindsThatPortsTripOver) {
+  constexpr int count = 600;
+  std::array<int, class_names.size()> seen{};
+  for (std::uint64_t seed = 1; seed <= count; ++seed) {
+    const Classes c = classes_of(problem_of(random_genome(seed), "fuzz"));
+    for (std::size_t k = 0; k < c.size(); ++k) seen[k] += c[k];
+  }
+  for (std::size_t k = 0; k < seen.size(); ++k) {
+    // No kind is so rare that a thousand problems could miss it, and none is all there is.
+    EXPECT_GT(seen[k], count / 50) << class_names[k];
+    EXPECT_LT(seen[k], count * 19 / 20) << class_names[k];
+  }
+}
+
+TEST(Campaign, FindsNothingInWhatIsRight) {
+  Settings s = settings_of(48, all_properties());
+  s.backends = {"brute", "hash", "list"};
+  s.threads = 2;
+  const Campaign c = run_campaign(s, on_host);
+  EXPECT_EQ(c.cases, 48);
+  EXPECT_LT(c.undecidable, 5);
+  std::set<std::string> asked;
+  for (const Tally& t : c.tallies) {
+    EXPECT_EQ(t.failed, 0) << t.property << " " << t.backend << ": seed " << t.worst_seed;
+    EXPECT_GT(t.asked, 0);
+    asked.insert(t.property);
+  }
+  EXPECT_EQ(asked, all_properties());
+  EXPECT_TRUE(c.findings.empty());
+}
+
+TEST(Campaign, IsTheSameWithAnyNumberOfThreads) {
+  Campaign one, two;
+  for (Campaign* c : {&one, &two}) {
+    Settings s = settings_of(24, {"fields", "substep", "trajectory"});
+    s.first_seed = 1000;
+    s.threads = c == &one ? 1 : 3;
+    *c = run_campaign(s, on_host);
+  }
+  ASSERT_EQ(one.tallies.size(), two.tallies.size());
+  EXPECT_EQ(one.classes, two.classes);
+  for (std::size_t k = 0; k < one.tallies.size(); ++k) {
+    EXPECT_EQ(one.tallies[k].worst, two.tallies[k].worst);
+    EXPECT_EQ(one.tallies[k].worst_seed, two.tallies[k].worst_seed);
+    EXPECT_EQ(one.tallies[k].histogram, two.tallies[k].histogram);
+  }
+}
+
+/// The reference with one wrong density wherever three particles or more are there.
+std::unique_ptr<Backend> with_a_fault(const std::string&) {
+  test::Edit edit;
+  edit.evaluated = [](const Scene&, Fields& f) {
+    if (f.density.size() >= 3) f.density[2] *= 1.001;
+  };
+  return std::make_unique<test::EditedReference>(edit);
+}
+
+TEST(Campaign, ShrinksAFaultToWhatShowsItAndWritesThatDown) {
+  const test::TemporaryFolder folder;
+  Settings s = settings_of(20, {"fields"});
+  s.backends = {"reference"};
+  s.failures = folder / "failing";
+  const Campaign c = run_campaign(s, with_a_fault);
+  ASSERT_EQ(c.findings.size(), 1u);
+  const Finding& found = c.findings[0];
+  EXPECT_EQ(found.outcome.property, "fields");
+  EXPECT_NE(found.outcome.reason.find("density"), std::string::npos) << found.outcome.reason;
+  EXPECT_EQ(found.genome.points.size(), 3u);
+  EXPECT_GT(found.found_particles, 3u);
+  EXPECT_EQ(found.genome.room, Room::open);
+  EXPECT_EQ(found.genome.kernel, 0);
+  // What was written fails again, and only with the fault.
+  const Fixture fixture = read_fixture(found.file);
+  const Judgement oracle = prepare(fixture, {"fields"});
+  const auto fails = [&](Backend& backend) {
+    for (const CheckRow& row : judge(backend, fixture, oracle, {"fields"}))
+      if (judged_verdict(row) != Verdict::pass) return true;
+    return false;
+  };
+  EXPECT_TRUE(fails(*with_a_fault("")));
+  EXPECT_FALSE(fails(*choose_backend("reference", "host")));
+  EXPECT_NO_THROW(check_scene(fixture.scene, "found"));
+}
+
+TEST(Campaign, EndsWhereItIsToldToAndKeepsWhatItHas) {
+  Settings s = settings_of(-1, {"fields"});
+  std::atomic<int> asked{0};
+  s.stop = [&] { return ++asked > 5; };
+  const Campaign c = run_campaign(s, on_host);
+  EXPECT_EQ(c.cases, 5);
+  s.stop = nullptr;
+  s.seconds = 0.5;
+  EXPECT_GT(run_campaign(s, on_host).cases, 3);
+}
+
+TEST(Campaign, HandsOnWhatABackendThrows) {
+  const auto make = [](const std::string&) -> std::unique_ptr<Backend> {
+    throw BackendError("no device");
+  };
+  const Campaign c = run_campaign(settings_of(3, {"fields"}), make);
+  ASSERT_EQ(c.tallies.size(), 1u);
+  EXPECT_EQ(c.tallies[0].failed, c.tallies[0].asked);
+}
+
+TEST(Campaign, ReportsAreAsDocumentedAndMerge) {
+  if (!test::python_has("h5py")) GTEST_SKIP() << "no h5py in " << test::python();
+  const test::TemporaryFolder folder;
+  Settings s = settings_of(6, {"fields", "refusal"});
+  const auto a = folder / "a.h5", b = folder / "b.h5", all = folder / "all.h5";
+  const BackendInfo info{"hash", "", "host", "here", "fp32"};
+  Campaign first = run_campaign(s, on_host);
+  write_campaign(a, first, info);
+  s.first_seed = 7;
+  s.backends = {"reference"};
+  write_campaign(b, run_campaign(s, with_a_fault), info);
+  const std::string tools = "'" DECANT_SOURCE_DIR "/tools/", quoted_a = " '" + a.string() + "'";
+  EXPECT_EQ(test::run_python(tools + "merge_fuzz.py'" + quoted_a + " '" + b.string() + "' --out '" +
+                             all.string() + "'"),
+            0);
+  for (const auto& file : {a, b, all})
+    EXPECT_EQ(test::run_python(tools + "check_schema.py' '" + file.string() + "'"), 0) << file;
+  const Hdf5Reader merged(all);
+  EXPECT_EQ(merged.integer_attribute("/", "cases"), 12);
+  EXPECT_EQ(merged.integers("/findings/seed").size(), 1);
+  EXPECT_EQ(test::run_python(tools + "merge_fuzz.py'" + quoted_a + quoted_a + " --out '" +
+                             all.string() + "' 2>/dev/null"),
+            2);
+}
+
+}  // namespace
+}  // namespace decant::fuzz

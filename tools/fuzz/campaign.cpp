@@ -1,0 +1,164 @@
+/// \file
+/// Threads take seeds by turns, each with backends of its own; what they find is put in order after.
+#include "tools/fuzz/campaign.hpp"
+
+#include "reference/scene_file.hpp"
+#include "tools/recording.hpp"
+
+#include <fmt/format.h>
+#include <omp.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <exception>
+#include <fstream>
+#include <map>
+#include <mutex>
+#include <thread>
+
+namespace decant::fuzz {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+std::size_t bin_of(double score) {
+  if (!(score > 0)) return 0;
+  // A score that is no number is beyond every bound.
+  const double at = std::isnan(score) ? 1 : std::ceil(std::log2(score));
+  return static_cast<std::size_t>(std::clamp(at + 10, 0.0, 11.0));
+}
+
+class Running {
+ public:
+  Running(const Settings& settings, const BackendMaker& make) : s_(settings), make_(make) {
+    all_.first_seed = s_.first_seed;
+  }
+
+  Campaign run() {
+    std::vector<std::thread> threads;
+    for (int t = 0; t < s_.threads; ++t) threads.emplace_back([this] { work(); });
+    for (auto& thread : threads) thread.join();
+    if (trouble_) std::rethrow_exception(trouble_);
+    for (auto& [key, tally] : tallies_) all_.tallies.push_back(tally);
+    std::sort(all_.findings.begin(), all_.findings.end(), [](const Finding& a, const Finding& b) {
+      return std::tie(a.seed, a.outcome.backend, a.outcome.property) <
+             std::tie(b.seed, b.outcome.backend, b.outcome.property);
+    });
+    all_.seconds = seconds();
+    return all_;
+  }
+
+ private:
+  double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
+
+  bool over(std::int64_t next) const {
+    return ended_ || (s_.cases >= 0 && next >= s_.cases) ||
+           (s_.seconds > 0 && seconds() >= s_.seconds) || (s_.stop && s_.stop());
+  }
+
+  void work() {
+    try {
+      if (s_.one_core_each) omp_set_num_threads(1);
+      Tester tester(s_.backends, s_.properties, make_);
+      for (;;) {
+        // Seeds are consecutive: whoever takes one has it done.
+        const std::int64_t k = next_.fetch_add(1);
+        if (over(k)) break;
+        const std::uint64_t seed = s_.first_seed + static_cast<std::uint64_t>(k);
+        const Genome genome = random_genome(seed);
+        const Classes classes = classes_of(problem_of(genome, fmt::format("fuzz-{}", seed)));
+        const std::vector<Outcome> outcomes = tester.test(genome, seed);
+        take(classes, outcomes, seed);
+        for (const Outcome& outcome : outcomes)
+          if (!outcome.holds) find(tester, seed, genome, outcome);
+      }
+    } catch (...) {
+      const std::lock_guard lock(mutex_);
+      trouble_ = std::current_exception();
+      ended_ = true;
+    }
+  }
+
+  void take(const Classes& classes, const std::vector<Outcome>& outcomes, std::uint64_t seed) {
+    const std::lock_guard lock(mutex_);
+    ++all_.cases;
+    for (std::size_t c = 0; c < classes.size(); ++c) all_.classes[c] += classes[c];
+    if (outcomes.empty()) ++all_.undecidable;
+    for (const Outcome& o : outcomes) {
+      Tally& tally = tallies_[{o.property, o.backend}];
+      tally.backend = o.backend;
+      tally.property = o.property;
+      ++tally.asked;
+      tally.failed += !o.holds;
+      ++tally.histogram[bin_of(o.holds ? o.score : 2)];
+      if (o.score < tally.worst || (o.score == tally.worst && seed >= tally.worst_seed)) continue;
+      tally.worst = o.score;
+      tally.worst_seed = seed;
+      tally.worst_field = o.field;
+    }
+    if (!s_.progress || std::chrono::duration<double>(Clock::now() - told_).count() < 1) return;
+    told_ = Clock::now();
+    all_.seconds = seconds();
+    Campaign now = all_;
+    for (auto& [key, tally] : tallies_) now.tallies.push_back(tally);
+    s_.progress(now);
+  }
+
+  /// One finding a property and backend is shrunk; the others are counted.
+  void find(Tester& tester, std::uint64_t seed, const Genome& genome, const Outcome& outcome) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (!shrunk_.insert(outcome.backend + " " + outcome.property).second) return;
+    }
+    Finding found;
+    found.seed = seed;
+    found.genome = genome;
+    found.outcome = outcome;
+    found = shrink(tester, std::move(found), s_.shrink_tries);
+    const std::lock_guard lock(mutex_);
+    if (!s_.failures.empty()) found.file = write_finding(s_.failures, found);
+    all_.findings.push_back(std::move(found));
+    if (static_cast<int>(all_.findings.size()) >= s_.most_findings) ended_ = true;
+  }
+
+  const Settings& s_;
+  const BackendMaker& make_;
+  Clock::time_point start_ = Clock::now(), told_ = start_;
+  std::atomic<std::int64_t> next_{0};
+  std::atomic<bool> ended_{false};
+  std::mutex mutex_;
+  std::map<std::pair<std::string, std::string>, Tally> tallies_;  // by property and backend
+  std::set<std::string> shrunk_;
+  Campaign all_;
+  std::exception_ptr trouble_;
+};
+
+}  // namespace
+
+Campaign run_campaign(const Settings& settings, const BackendMaker& make) {
+  return Running(settings, make).run();
+}
+
+std::string write_finding(const std::filesystem::path& folder, const Finding& finding) {
+  std::filesystem::create_directories(folder);
+  std::string backend = finding.outcome.backend;
+  for (char& c : backend)
+    if (c == ':' || c == '=') c = '-';
+  const std::string name =
+      fmt::format("fuzz-{}-{}-{}", finding.seed, backend, finding.outcome.property);
+  Fixture fixture = problem_of(finding.genome, name);
+  fixture.provenance = build_provenance();
+  fixture.provenance["fuzz_seed"] = fmt::format("{}", finding.seed);
+  fixture.provenance["fuzz_property"] = finding.outcome.property;
+  fixture.provenance["fuzz_backend"] = finding.outcome.backend;
+  fixture.provenance["fuzz_reason"] = finding.outcome.reason;
+  (void)record_answer(fixture, 32, 24);
+  const auto file = folder / (name + ".h5");
+  write_fixture(file, fixture);
+  std::ofstream(folder / (name + ".json")) << scene_to_json(fixture.scene);
+  return file.string();
+}
+
+}  // namespace decant::fuzz

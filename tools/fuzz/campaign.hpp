@@ -1,0 +1,126 @@
+/// \file
+/// A fuzzing campaign: problems from consecutive seeds, held to properties; what fails is shrunk, written
+/// as a fixture that shows it again, and reported.
+#pragma once
+
+#include "oracle/backend.hpp"
+#include "tools/fuzz/genome.hpp"
+
+#include <array>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace decant::fuzz {
+
+/// A property that every problem has to have.
+struct Property {
+  const char* name;
+  const char* sentence;
+  int every;         // of so many problems one is held to it, by its seed
+  bool of_backend;   // else of the scene alone
+};
+const std::vector<Property>& properties();
+
+/// What one property showed on one problem.
+struct Outcome {
+  std::string backend, property;
+  bool holds = true;
+  double score = 0;      // largest |error| / tolerance; 0 where the property is yes or no
+  std::string field;     // and what it is of
+  std::string reason;    // in words, where it does not hold
+};
+
+/// Makes the backend of a choice on the command line.
+using BackendMaker = std::function<std::unique_ptr<Backend>(const std::string& choice)>;
+
+/// Backends that serve one thread.
+class Tester {
+ public:
+  Tester(std::vector<std::string> backends, std::set<std::string> properties, BackendMaker make);
+
+  /// Holds one problem to all properties whose turn it is. Empty `outcomes`: fp32 cannot tell this
+  /// problem's neighbors apart, and no property is asked.
+  std::vector<Outcome> test(const Genome& genome, std::uint64_t seed);
+  /// One property of one backend, whosever turn it is.
+  Outcome test_one(const Genome& genome, std::uint64_t seed, const Outcome& like);
+
+ private:
+  std::vector<Outcome> outcomes(const Fixture& problem, std::uint64_t seed,
+                                const std::set<std::string>& backends,
+                                const std::set<std::string>& wanted);
+  Backend& backend(const std::string& choice);
+
+  std::vector<std::string> names_;
+  std::set<std::string> properties_;
+  BackendMaker make_;
+  std::vector<std::pair<std::string, std::unique_ptr<Backend>>> made_;
+};
+
+/// A failure and what shrinking left of it.
+struct Finding {
+  std::uint64_t seed = 0;
+  Outcome outcome;             // of the shrunk problem
+  Genome genome;               // shrunk
+  std::size_t found_particles = 0;
+  int tries = 0;               // problems tried while shrinking
+  std::string file;            // the fixture written; empty: none
+};
+
+/// Fewer particles, then smaller numbers, as long as the same property of the same backend fails.
+/// Ends after so many tries or seconds.
+Finding shrink(Tester& tester, Finding found, int most_tries, double seconds = 20);
+
+/// Scores of a property of a backend over all problems.
+struct Tally {
+  std::string backend, property;
+  std::int64_t asked = 0, failed = 0;
+  double worst = 0;
+  std::uint64_t worst_seed = 0;
+  std::string worst_field;
+  std::array<std::int64_t, 12> histogram{};  // of log2(score) from ≤ −10 to > 0
+};
+
+struct Settings {
+  std::vector<std::string> backends;
+  std::set<std::string> properties;
+  std::uint64_t first_seed = 1;
+  std::int64_t cases = 1000;   // of consecutive seeds; < 0: as many as there is time for
+  double seconds = 0;          // 0: no limit
+  int threads = 1;
+  int most_findings = 16;      // a campaign stops here
+  int shrink_tries = 2000;
+  std::filesystem::path failures;  // folder for fixtures of findings; empty: none are written
+  std::function<bool()> stop;
+  std::function<void(const struct Campaign&)> progress;  // now and then, from one thread at a time
+  bool one_core_each = true;   // OpenMP inside a backend is switched off
+};
+
+struct Campaign {
+  std::uint64_t first_seed = 0;
+  std::int64_t cases = 0;        // problems drawn, consecutive
+  std::int64_t undecidable = 0;  // of them, not held to anything
+  double seconds = 0;
+  std::array<std::int64_t, class_names.size()> classes{};
+  std::vector<Tally> tallies;
+  std::vector<Finding> findings;
+};
+
+/// Runs. The same seeds give the same tallies, whatever the number of threads.
+Campaign run_campaign(const Settings& settings, const BackendMaker& make);
+
+/// Writes the finding's problem with the oracle's answer, for `decant conform`, and its scene beside it;
+/// returns the fixture's file.
+std::string write_finding(const std::filesystem::path& folder, const Finding& finding);
+
+/// Table for people.
+std::string campaign_table(const Campaign& campaign);
+
+/// Layout in oracle/fuzz-format.md.
+void write_campaign(const std::filesystem::path& file, const Campaign& campaign,
+                    const BackendInfo& backend);
+
+}  // namespace decant::fuzz

@@ -1,0 +1,122 @@
+/// \file
+/// Shrinking: a failure is made as small as it stays one. First particles leave, by halves, quarters and
+/// so on to one (Zeller & Hildebrandt, IEEE Trans. Softw. Eng. 28 (2002), `ddmin`), then what is around
+/// them is made plain, then every number goes towards 0 by halves; over again as long as that helps.
+#include "tools/fuzz/campaign.hpp"
+
+#include <algorithm>
+#include <chrono>
+
+namespace decant::fuzz {
+namespace {
+
+class Shrinking {
+ public:
+  Shrinking(Tester& tester, Finding found, int most_tries, double seconds)
+      : tester_(tester),
+        best_(std::move(found)),
+        most_(most_tries),
+        end_(Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                                std::chrono::duration<double>(seconds))) {}
+
+  Finding run() {
+    best_.found_particles = best_.genome.points.size();
+    for (bool smaller = true; smaller && best_.tries < most_;) {
+      const Genome before = best_.genome;
+      drop_particles();
+      make_plain();
+      lower_numbers();
+      smaller = best_.genome != before;
+    }
+    return best_;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  /// Takes the candidate where it fails as the one found does.
+  bool take(const Genome& candidate) {
+    if (candidate == best_.genome || best_.tries >= most_ || Clock::now() >= end_) return false;
+    ++best_.tries;
+    Outcome outcome;
+    try {
+      outcome = tester_.test_one(candidate, best_.seed, best_.outcome);
+    } catch (const std::exception&) {
+      return false;  // no scene
+    }
+    if (outcome.holds) return false;
+    best_.genome = candidate;
+    best_.outcome = outcome;
+    return true;
+  }
+
+  void drop_particles() {
+    for (std::size_t chunk = std::max<std::size_t>(best_.genome.points.size() / 2, 1); chunk > 0;
+         chunk /= 2)
+      for (std::size_t from = 0; from < best_.genome.points.size();) {
+        Genome fewer = best_.genome;
+        const auto first = fewer.points.begin() + static_cast<std::ptrdiff_t>(from);
+        const auto count = std::min(chunk, fewer.points.size() - from);
+        fewer.points.erase(first, first + static_cast<std::ptrdiff_t>(count));
+        if (!take(fewer)) from += chunk;
+      }
+  }
+
+  template <class Change>
+  void attempt(Change change) {
+    Genome plainer = best_.genome;
+    change(plainer);
+    take(plainer);
+  }
+
+  void make_plain() {
+    attempt([](Genome& g) { g.room = Room::open; });
+    attempt([](Genome& g) {
+      if (g.room == Room::tilting_cup) g.room = Room::cup;
+    });
+    attempt([](Genome& g) { g.periodic = {}; });
+    for (std::size_t a = 0; a < 3; ++a)
+      attempt([a](Genome& g) { g.periodic[a] = 0; });
+    attempt([](Genome& g) {
+      g.offset = {};
+      g.far = 0;
+    });
+    attempt([](Genome& g) { g.far = 0; });
+    for (int Genome::*number : {&Genome::belt, &Genome::floor, &Genome::turn, &Genome::substep, &Genome::friction,
+                                &Genome::restitution, &Genome::contact, &Genome::tension,
+                                &Genome::linear_state, &Genome::viscosity,
+                                &Genome::wall_viscosity, &Genome::kernel, &Genome::scale})
+      attempt([number](Genome& g) { g.*number = 0; });
+    attempt([](Genome& g) { g.support = 4; });
+    attempt([](Genome& g) { g.layers = 1; });
+    attempt([](Genome& g) { g.courant = 4; });
+    for (std::size_t a = 0; a < 3; ++a)
+      attempt([a](Genome& g) { g.size[a] = 5; });
+    attempt([](Genome& g) {
+      for (Point& p : g.points) p.v = {};
+    });
+  }
+
+  /// Whole lattice spacings first, then halves.
+  void lower_numbers() {
+    for (std::size_t i = 0; i < best_.genome.points.size(); ++i)
+      for (std::size_t a = 0; a < 3; ++a) {
+        attempt([&](Genome& g) { g.points[i].v[a] = 0; });
+        for (int grain = 64; grain > 1; grain /= 4)
+          attempt([&](Genome& g) { g.points[i].x[a] = g.points[i].x[a] / grain * grain; });
+      }
+  }
+
+  Tester& tester_;
+  Finding best_;
+  int most_;
+  Clock::time_point end_;
+};
+
+}  // namespace
+
+Finding shrink(Tester& tester, Finding found, int most_tries, double seconds) {
+  return Shrinking(tester, std::move(found), most_tries, seconds).run();
+}
+
+}  // namespace decant::fuzz
