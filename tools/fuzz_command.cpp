@@ -35,7 +35,7 @@ std::string footer() {
       "reports. What fails is shrunk and written as a fixture, which `decant conform` shows again, with\n"
       "its scene beside it. Ctrl-C ends a campaign and keeps what it found.\n"
       "\n"
-      "Properties (some are asked of every 4th or 8th problem only):\n";
+      "Properties; where none is named, the dear ones are asked of every 4th or 8th problem:\n";
   for (const fuzz::Property& p : fuzz::properties())
     text += fmt::format("  {:<13} {}\n", p.name, p.sentence);
   return text +
@@ -75,6 +75,7 @@ void run(FuzzArguments& arguments, int& exit_status) {
   fuzz::Settings settings;
   settings.backends = arguments.backends;
   settings.properties = chosen(arguments.properties);
+  settings.every_problem = !arguments.properties.empty();
   settings.first_seed = arguments.seed;
   settings.cases = arguments.cases;
   settings.seconds = arguments.seconds;
@@ -125,7 +126,7 @@ void add_fuzz_command(CLI::App& app, int& exit_status) {
       ->capture_default_str();
   verb.add_option("--executor", arguments->executor, "cuda, host, or auto: the GPU where there is one")
       ->capture_default_str();
-  verb.add_option("--property", arguments->properties, "by name; all where none is given")
+  verb.add_option("--property", arguments->properties, "by name, each asked of every problem; all where none is given")
       ->delimiter(',');
   verb.add_option("--cases", arguments->cases, "problems; 1000 where neither this nor --seconds is given")
       ->check(CLI::Range(std::int64_t{1}, std::int64_t{1} << 40));

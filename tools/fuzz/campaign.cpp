@@ -61,7 +61,7 @@ class Running {
   void work() {
     try {
       if (s_.one_core_each) omp_set_num_threads(1);
-      Tester tester(s_.backends, s_.properties, make_);
+      Tester tester(s_.backends, s_.properties, make_, s_.every_problem);
       for (;;) {
         // Seeds are consecutive: whoever takes one has it done.
         const std::int64_t k = next_.fetch_add(1);

@@ -40,7 +40,9 @@ using BackendMaker = std::function<std::unique_ptr<Backend>(const std::string& c
 /// Backends that serve one thread.
 class Tester {
  public:
-  Tester(std::vector<std::string> backends, std::set<std::string> properties, BackendMaker make);
+  /// \param every_problem  asks each property of every problem, whosever turn it is
+  Tester(std::vector<std::string> backends, std::set<std::string> properties, BackendMaker make,
+         bool every_problem = false);
 
   /// Holds one problem to all properties whose turn it is. Empty `outcomes`: fp32 cannot tell this
   /// problem's neighbors apart, and no property is asked.
@@ -57,6 +59,7 @@ class Tester {
   std::vector<std::string> names_;
   std::set<std::string> properties_;
   BackendMaker make_;
+  bool every_problem_;
   std::vector<std::pair<std::string, std::unique_ptr<Backend>>> made_;
 };
 
@@ -87,6 +90,7 @@ struct Tally {
 struct Settings {
   std::vector<std::string> backends;
   std::set<std::string> properties;
+  bool every_problem = false;  // properties are asked of every problem, whosever turn it is
   std::uint64_t first_seed = 1;
   std::int64_t cases = 1000;   // of consecutive seeds; < 0: as many as there is time for
   double seconds = 0;          // 0: no limit

@@ -214,8 +214,11 @@ const std::vector<Property>& properties() {
 }
 
 Tester::Tester(std::vector<std::string> backends, std::set<std::string> properties,
-               BackendMaker make)
-    : names_(std::move(backends)), properties_(std::move(properties)), make_(std::move(make)) {}
+               BackendMaker make, bool every_problem)
+    : names_(std::move(backends)),
+      properties_(std::move(properties)),
+      make_(std::move(make)),
+      every_problem_(every_problem) {}
 
 Backend& Tester::backend(const std::string& choice) {
   for (auto& [name, made] : made_)
@@ -226,7 +229,8 @@ Backend& Tester::backend(const std::string& choice) {
 std::vector<Outcome> Tester::test(const Genome& genome, std::uint64_t seed) {
   std::set<std::string> wanted;
   for (const Property& property : properties())
-    if (properties_.contains(property.name) && seed % static_cast<std::uint64_t>(property.every) == 0)
+    if (properties_.contains(property.name) &&
+        (every_problem_ || seed % static_cast<std::uint64_t>(property.every) == 0))
       wanted.insert(property.name);
   return outcomes(problem_of(genome, fmt::format("fuzz-{}", seed)), seed,
                   {names_.begin(), names_.end()}, wanted);
