@@ -83,6 +83,12 @@ inline constexpr int tile_size = 256;
 
 DECANT_BOTH int padded(int n) { return (n + tile_size - 1) / tile_size * tile_size; }
 
+#ifdef __CUDACC__
+/// The calling thread's own, so that backends on several threads wait for nobody else's work. Whoever
+/// hands a backend to another thread does so between its calls, at whose end all is done.
+inline const cudaStream_t own_stream = cudaStreamPerThread;
+#endif
+
 /// Device memory of n elements, freed with the object.
 template <class T>
 class Buffer {
@@ -127,20 +133,25 @@ class Buffer {
 #ifdef __CUDACC__
   static void* allocate(std::size_t bytes) {
     void* p = nullptr;
-    CUDA_CHECK(cudaMalloc(&p, bytes));
+    CUDA_CHECK(cudaMallocAsync(&p, bytes, own_stream));
     return p;
   }
   static void fill_ones(void* p, std::size_t bytes) {
-    if (bytes) CUDA_CHECK(cudaMemset(p, 0xFF, bytes));
+    if (bytes) CUDA_CHECK(cudaMemsetAsync(p, 0xFF, bytes, own_stream));
   }
   static void copy_in(void* to, const void* from, std::size_t bytes) {
-    if (bytes) CUDA_CHECK(cudaMemcpy(to, from, bytes, cudaMemcpyHostToDevice));
+    copy(to, from, bytes, cudaMemcpyHostToDevice);
   }
   static void copy_out(void* to, const void* from, std::size_t bytes) {
-    if (bytes) CUDA_CHECK(cudaMemcpy(to, from, bytes, cudaMemcpyDeviceToHost));
+    copy(to, from, bytes, cudaMemcpyDeviceToHost);
+  }
+  static void copy(void* to, const void* from, std::size_t bytes, cudaMemcpyKind kind) {
+    if (bytes == 0) return;
+    CUDA_CHECK(cudaMemcpyAsync(to, from, bytes, kind, own_stream));
+    CUDA_CHECK(cudaStreamSynchronize(own_stream));
   }
   void release() {
-    cudaFree(data_);  // a destructor has nobody to report to
+    if (data_) cudaFreeAsync(data_, own_stream);  // a destructor has nobody to report to
     data_ = nullptr;
     size_ = 0;
   }

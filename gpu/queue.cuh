@@ -39,17 +39,19 @@ static __global__ void decide_kernel(cudaGraphConditionalHandle handle, const in
   cudaGraphSetConditional(handle, *flag != 0);
 }
 
-/// Passes in order on one stream.
+/// Passes in order on the calling thread's stream.
 class Queue {
  public:
+  // What other threads do is refused while a stream that blocks theirs is captured.
   Queue() {
-    CUDA_CHECK(cudaStreamCreate(&stream_));
-    CUDA_CHECK(cudaStreamCreate(&inner_));
+    CUDA_CHECK(cudaStreamCreateWithFlags(&recorded_, cudaStreamNonBlocking));
+    CUDA_CHECK(cudaStreamCreateWithFlags(&inner_, cudaStreamNonBlocking));
+    keep_freed_memory();
   }
   Queue(const Queue&) = delete;
   Queue& operator=(const Queue&) = delete;
   ~Queue() {
-    cudaStreamDestroy(stream_);
+    cudaStreamDestroy(recorded_);
     cudaStreamDestroy(inner_);
   }
 
@@ -141,10 +143,32 @@ class Queue {
     capture_into(parameters.conditional.phGraph_out[0], then);
   }
 
+  /// The passes as a graph of their own; none of them runs.
+  template <class Passes>
+  cudaGraph_t capture(Passes passes) {
+    cudaGraph_t graph = nullptr;
+    CUDA_CHECK(cudaStreamBeginCapture(recorded_, cudaStreamCaptureModeThreadLocal));
+    std::swap(stream_, recorded_);
+    passes();
+    std::swap(stream_, recorded_);
+    CUDA_CHECK(cudaStreamEndCapture(recorded_, &graph));
+    return graph;
+  }
+
   void wait() { CUDA_CHECK(cudaStreamSynchronize(stream_)); }
   cudaStream_t stream() const { return stream_; }
 
  private:
+  /// So that loading one small problem after the other does not go to the driver for each array.
+  static void keep_freed_memory() {
+    int device = 0;
+    cudaMemPool_t pool = nullptr;
+    std::uint64_t kept = 256u << 20;
+    CUDA_CHECK(cudaGetDevice(&device));
+    CUDA_CHECK(cudaDeviceGetDefaultMemPool(&pool, device));
+    CUDA_CHECK(cudaMemPoolSetAttribute(pool, cudaMemPoolAttrReleaseThreshold, &kept));
+  }
+
   template <class Body>
   void capture_into(cudaGraph_t graph, Body body) {
     CUDA_CHECK(cudaStreamBeginCaptureToGraph(inner_, graph, nullptr, nullptr, 0,
@@ -155,7 +179,7 @@ class Queue {
     CUDA_CHECK(cudaStreamEndCapture(inner_, &graph));
   }
 
-  cudaStream_t stream_ = nullptr, inner_ = nullptr;
+  cudaStream_t stream_ = own_stream, recorded_ = nullptr, inner_ = nullptr;
 };
 
 /// A sequence of passes, kept to be run again and again.
@@ -169,10 +193,7 @@ class Recording {
   template <class Passes>
   void record(Queue& queue, Passes passes) {
     clear();
-    cudaGraph_t graph = nullptr;
-    CUDA_CHECK(cudaStreamBeginCapture(queue.stream(), cudaStreamCaptureModeThreadLocal));
-    passes();
-    CUDA_CHECK(cudaStreamEndCapture(queue.stream(), &graph));
+    const cudaGraph_t graph = queue.capture(passes);
     const cudaError_t error = cudaGraphInstantiate(&executable_, graph, 0);
     cudaGraphDestroy(graph);
     CUDA_CHECK(error);
