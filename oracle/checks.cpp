@@ -42,12 +42,14 @@ const std::vector<CheckDescription>& check_descriptions() {
       {"mass",
        "After the run every id is there once, finite and inside the domain; the particles of all places "
        "(source, in flight, receiver, spilled, lost) add up to all particles.",
-       "Exact: counts.",
+       "Exact: counts. Two with the same position and velocity, bit for bit, are one too many, unless the "
+       "oracle has them in one place as well or they started as one.",
        "Two ids exchanged (fields and substep see that)."},
       {"containment",
        "Depth inside any wall and paths through walls during the run, judged in double from positions and "
        "from the way between two looks, in each container's own frame.",
-       "No deeper, and no more crossings, than the oracle's own run shows.",
+       "No deeper, and no more crossings, than the oracle's own run shows; where that is inside a wall "
+       "itself, a distance's rounding of 8 u X deeper.",
        "What happens between two looks and is undone."},
       {"conservation",
        "The forces between fluid particles add up to nothing, pressure and viscosity apart: momentum.",

@@ -147,7 +147,8 @@ Judgement prepare(const Fixture& fixture, const CheckSelection& checks, int look
   const Scene& scene = fixture.scene;
   Judgement j;
   j.walls = sample_walls(scene);
-  j.own = answer(scene, j.walls, fixture.state);
+  const WallAnswer volumes = wall_answer(scene, j.walls);
+  j.own = answer(scene, j.walls, volumes, fixture.state);
   require_reproduced(fixture, j.own);
   j.inputs.density = j.own.fields.density.cast<float>().cast<double>();
   j.inputs.pressure = j.own.fields.pressure.cast<float>().cast<double>();
@@ -156,10 +157,10 @@ Judgement prepare(const Fixture& fixture, const CheckSelection& checks, int look
                        [&](const char* name) { return checks.count(name) > 0; });
   };
   if (wanted({"fields", "conservation"})) {
-    j.given = answer(scene, j.walls, fixture.state, &j.inputs);
-    j.given_float = float_fields(scene, j.walls, fixture.state, &j.inputs);
+    j.given = answer(scene, j.walls, volumes, fixture.state, &j.inputs);
+    j.given_float = float_fields(scene, j.walls, volumes, fixture.state, &j.inputs);
   }
-  if (wanted({"fields"})) j.own_float = float_fields(scene, j.walls, fixture.state);
+  if (wanted({"fields"})) j.own_float = float_fields(scene, j.walls, volumes, fixture.state);
   if (wanted({"substep"})) j.substep = substep_answer(scene, fixture.state, j.own);
   if (wanted({"trajectory", "mass", "containment", "determinism"}))
     run_ahead(fixture, look_every, j);

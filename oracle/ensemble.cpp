@@ -53,6 +53,10 @@ class Disturbance {
     of(scene.fluid.wall_viscosity);
     for (double& g : scene.gravity) of(g);
     of(scene.schedule.end);
+    of(scene.contact.distance_ratio);
+    if (scene.floor) of(scene.floor->height);
+    for (Container& c : scene.containers)
+      for (double& x : c.origin) of(x);
   }
 
  private:
@@ -73,19 +77,21 @@ Divergence divergence(const Scene& scene, const ParticleState& a, const Particle
           std::abs(energy(scene, a) - energy(scene, b))};
 }
 
-ParticleState run_oracle(const Scene& scene, const Walls& walls, const ParticleState& start,
-                         std::int64_t substeps) {
-  Solver solver(scene, walls, start);
+namespace {
+
+ParticleState run_undisturbed(Solver solver, std::int64_t substeps) {
   for (std::int64_t k = 0; k < substeps; ++k) solver.substep();
   return solver.state();
 }
 
-ParticleState run_disturbed(const Scene& scene, const Walls& walls, const ParticleState& start,
-                            std::int64_t substeps, std::uint32_t seed) {
+/// A disturbance leaves the walls' volumes alone: V_b knows nothing but their own distances.
+ParticleState run_disturbed(const Scene& scene, const Walls& walls, const Eigen::VectorXd& volumes,
+                            const ParticleState& start, std::int64_t substeps,
+                            std::uint32_t seed) {
   Disturbance disturbance(seed);
   Scene its_scene = scene;
   disturbance.of(its_scene);
-  Solver solver(its_scene, walls, start);
+  Solver solver(its_scene, walls, start, volumes);
   ParticleState state = start;
   for (std::int64_t k = 0; k < substeps; ++k) {
     disturbance.of(state);
@@ -93,19 +99,35 @@ ParticleState run_disturbed(const Scene& scene, const Walls& walls, const Partic
     solver.substep();
     state = solver.state();
   }
+  state.quantise();
   return state;
+}
+
+}  // namespace
+
+ParticleState run_oracle(const Scene& scene, const Walls& walls, const ParticleState& start,
+                         std::int64_t substeps) {
+  return run_undisturbed(Solver(scene, walls, start), substeps);
+}
+
+ParticleState run_disturbed(const Scene& scene, const Walls& walls, const ParticleState& start,
+                            std::int64_t substeps, std::uint32_t seed) {
+  return run_disturbed(scene, walls, boundary_volumes<double>(scene, walls), start, substeps, seed);
 }
 
 Ensemble run_ensemble(const Scene& scene, const Walls& walls, const ParticleState& start,
                       std::int64_t substeps, std::int64_t members, std::uint32_t seed) {
-  const ParticleState undisturbed = run_oracle(scene, walls, start, substeps);
+  const Eigen::VectorXd volumes = boundary_volumes<double>(scene, walls);
+  const ParticleState undisturbed =
+      run_undisturbed(Solver(scene, walls, start, volumes), substeps);
   Ensemble e;
   e.substeps = substeps;
   e.members = members;
   std::vector<Divergence> all;
   for (std::int64_t m = 0; m < members; ++m)
     all.push_back(divergence(
-        scene, run_disturbed(scene, walls, start, substeps, seed + static_cast<std::uint32_t>(m)),
+        scene,
+        run_disturbed(scene, walls, volumes, start, substeps, seed + static_cast<std::uint32_t>(m)),
         undisturbed));
   const auto count = static_cast<double>(members);
   for (std::size_t k = 0; k < e.mean.size(); ++k) {

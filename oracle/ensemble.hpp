@@ -29,8 +29,9 @@ struct Ensemble {
 };
 
 /// The oracle's state `substeps` on, disturbed. Before every substep x_c and v_c of every particle are
-/// multiplied by 1 + u r, u = 2⁻²⁴, r uniform in [−1, 1], and rounded to fp32, as a backend stores them.
-/// So is, once, every constant that fp32 rounds once for all: mass, sound speed, viscosities, gravity, dt.
+/// multiplied by 1 + u r, u = 2⁻²⁴, r uniform in [−1, 1], and rounded to fp32, as a backend stores them;
+/// so is the end. Once, so is every constant that fp32 rounds once for all: mass, sound speed,
+/// viscosities, gravity, dt, and where walls and floor stand and from how far they push.
 ParticleState run_disturbed(const Scene& scene, const Walls& walls, const ParticleState& start,
                             std::int64_t substeps, std::uint32_t seed);
 

@@ -126,10 +126,12 @@ void judge_substep(const ParticleState& answer_of_backend, const Answered& answe
     tau_x.col(i) = nearest.position_tolerance;
     tau_v.col(i) = nearest.velocity_tolerance;
   }
-  // An undecidable push is no longer than a particle spacing and no faster than sound.
+  // An undecidable push is no longer than a particle spacing, or than what pushes back from deep inside
+  // a wall, one way or the other, and no faster than sound.
+  const double apart = std::max(fixture.scene.particle_spacing, 2 * answer.longest_push);
   judge_field("substep", "position", "m", answered,
               {flat(got.position), flat(x), flat(tau_x), {}, 3, &answer.ambiguous,
-               answer.most_ambiguous, -infinity, fixture.scene.particle_spacing},
+               answer.most_ambiguous, -infinity, apart},
               sheet);
   judge_field("substep", "velocity", "m/s", answered,
               {flat(got.velocity), flat(v), flat(tau_v), {}, 3, &answer.ambiguous,

@@ -4,6 +4,7 @@
 
 #include "reference/solver.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace decant {
@@ -18,6 +19,7 @@ struct Particle {
   /// Contacts that fp32 cannot decide, so far; bit k of `flips` turns the k-th round.
   int undecided = 0;
   unsigned flips = 0;
+  double pushed = 0;  // m, all pushes together
 
   /// Whether there is contact at this distance, known within e.
   bool touches(double distance, double reach, double e) {
@@ -42,7 +44,9 @@ void widen(const Scene& scene, const Pose& pose, double distance, double tau_n, 
            Particle& p) {
   const Vec3 w = p.v - pose.velocity_at(p.x);
   const double omega = pose.angular_velocity.norm();
-  p.tau_x.array() += (scene.contact_distance() - distance) * tau_n + e;
+  // The way to go is a difference, rounded, and so is where it leads.
+  const double way = scene.contact_distance() - distance;
+  p.tau_x += (way * (tau_n + 2 * u) + e) * Vec3::Ones() + 2 * u * p.x.cwiseAbs();
   p.tau_v.array() += (1 + scene.contact.restitution + scene.contact.friction) *
                          (2 * w.norm() * tau_n + p.tau_v.norm()) +
                      2 * omega * (p.tau_x.norm() + 4 * u * (p.x.norm() + pose.pivot.norm())) +
@@ -52,6 +56,7 @@ void widen(const Scene& scene, const Pose& pose, double distance, double tau_n, 
 /// The push-out itself, also where the oracle's own distance is not within reach.
 void push(const Scene& scene, double distance, const Vec3& normal, const Pose& pose, Particle& p) {
   const double reach = scene.contact_distance();
+  p.pushed += std::max(0.0, reach - distance);
   push_out(scene, std::min(distance, std::nextafter(reach, 0.0)), normal, pose, p.x, p.v);
 }
 
@@ -141,7 +146,10 @@ SubstepAnswer substep_answer(const Scene& scene, const ParticleState& state,
     for (unsigned flips = 0; flips < variants; ++flips) {
       const Particle p = substep.run(static_cast<Eigen::Index>(i), flips);
       answer.outcomes[i].push_back({p.x, p.v, p.tau_x, p.tau_v});
-      if (p.ambiguous || p.undecided > most_open) answer.ambiguous[i] = true;
+      if (p.ambiguous || p.undecided > most_open) {
+        answer.ambiguous[i] = true;
+        answer.longest_push = std::max(answer.longest_push, p.pushed);
+      }
       // Turning one contact round can open another further on.
       variants = std::max(variants, 1u << std::min(p.undecided, most_open));
     }

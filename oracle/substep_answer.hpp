@@ -22,10 +22,13 @@ struct SubstepAnswer {
   /// side of a period a particle comes back in on does not matter: positions are compared by images.
   std::vector<bool> ambiguous;      // N
   std::int64_t most_ambiguous = 0;  // 2 % of the particles, and ten
+  /// How far walls push any of those left out, all pushes of its substep together, m: one whose face
+  /// cannot be told may be pushed as far the other way.
+  double longest_push = 0;
 };
 
 /// tau_v = dt tau_a + 2u(|v| + dt|a|), tau_x = dt tau_v + 2u(|x| + dt|v|), and at every contact
-/// tau_x += (phi_c − phi) tau_n + e, tau_v += 2|w| tau_n + 2|omega| tau_x: e the error of the
+/// tau_x += (phi_c − phi)(tau_n + 2u) + 2u|x| + e, tau_v += 2|w| tau_n + 2|omega| tau_x: e the error of the
 /// distance (pose rounding and tau_x), tau_n how far the normal turns within e, w the velocity
 /// relative to the wall.
 /// \param fields  the oracle's answer at `state`

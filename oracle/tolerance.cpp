@@ -35,28 +35,20 @@ Eigen::VectorXd pose_magnitudes(const Scene& scene, const Walls& walls, const Po
   return X;
 }
 
-Eigen::VectorXd volume_tolerances(const Scene& scene, const Walls& walls,
+Eigen::VectorXd volume_tolerances(const Scene& scene, const WallNeighbors& neighbors,
                                   const Eigen::VectorXd& volumes) {
   const Kernel<double> kernel(scene.kernel, scene.support_radius());
   const Separation separation(scene.domain);
-  Eigen::VectorXd tolerance(walls.size());
-  Eigen::Index b = 0;
-  Neighbors near;
-  for (std::size_t c = 0; c < walls.containers.size(); ++c) {
-    const auto& x = walls.containers[c].position;
-    Scene local = scene;  // the domain as the container's frame sees it
-    local.domain.min -= scene.containers[c].origin;
-    local.domain.max -= scene.containers[c].origin;
-    find_neighbors(local, x, Eigen::Matrix3Xd(3, 0), NeighborSearch::cells, near);
-    for (Eigen::Index i = 0; i < x.cols(); ++i, ++b) {
-      const auto& ids = near.fluid[static_cast<std::size_t>(i)];
-      double sum = kernel.W(0);
-      for (const auto k : ids) {
-        const double r = separation(Vec3(x.col(i)), Vec3(x.col(k))).norm();
-        sum += kernel.W(r) + r * kernel.slope_W(r);
-      }
-      tolerance[b] = volumes[b] * volumes[b] * growth(ids.size() + 1, 6) * sum + 2 * u * volumes[b];
+  const Eigen::Matrix3Xd& x = neighbors.position;
+  Eigen::VectorXd tolerance(x.cols());
+  for (Eigen::Index b = 0; b < x.cols(); ++b) {
+    const auto& near = neighbors.near[static_cast<std::size_t>(b)];
+    double sum = kernel.W(0);
+    for (const auto k : near) {
+      const double r = separation(Vec3(x.col(b)), Vec3(x.col(k))).norm();
+      sum += kernel.W(r) + r * kernel.slope_W(r);
     }
+    tolerance[b] = volumes[b] * volumes[b] * growth(near.size() + 1, 6) * sum + 2 * u * volumes[b];
   }
   return tolerance;
 }
@@ -85,8 +77,8 @@ struct ForceBounds {
 
 class Bounds {
  public:
-  Bounds(const Scene& scene, const Walls& walls, const ParticleState& state,
-         const StageInputs* given)
+  Bounds(const Scene& scene, const Walls& walls, const WallAnswer& volumes,
+         const ParticleState& state, const StageInputs* given)
       : scene_(scene),
         state_(state),
         given_(given),
@@ -95,14 +87,13 @@ class Bounds {
         posed_(pose_walls(scene, walls, scene.time_at(state.substep))),
         X_(pose_magnitudes(scene, walls, posed_, scene.time_at(state.substep))) {
     OracleAnswer& a = answer_;
-    const Eigen::VectorXd volumes = boundary_volumes<double>(scene, walls);
     find_neighbors(scene, state.position, posed_.position, NeighborSearch::cells, near_);
-    evaluate<double>(scene, state, posed_, volumes, near_, a.fields, given);
+    evaluate<double>(scene, state, posed_, volumes.volume, near_, a.fields, given);
     a.tolerance = Fields::unwritten(state.size(), walls.size());
     for (auto* facts : {&a.tolerance.fluid_neighbor_count, &a.tolerance.fluid_neighbor_id_sum,
                         &a.tolerance.wall_neighbor_count, &a.tolerance.wall_neighbor_id_sum})
       facts->setZero();
-    a.tolerance.boundary_volume = volume_tolerances(scene, walls, volumes);
+    a.tolerance.boundary_volume = volumes.tolerance;
     ambiguous_pairs();
     density_and_pressure();
     wall_velocity_error(walls);
@@ -364,18 +355,31 @@ class Bounds {
 
 }  // namespace
 
-OracleAnswer answer(const Scene& scene, const Walls& walls, const ParticleState& state,
-                    const StageInputs* given) {
-  return Bounds(scene, walls, state, given).take();
+WallAnswer wall_answer(const Scene& scene, const Walls& walls) {
+  const WallNeighbors neighbors = find_wall_neighbors(scene, walls);
+  WallAnswer a;
+  a.volume = boundary_volumes<double>(scene, neighbors);
+  a.tolerance = volume_tolerances(scene, neighbors, a.volume);
+  a.float_volume = boundary_volumes<float>(scene, neighbors);
+  return a;
 }
 
-Fields float_fields(const Scene& scene, const Walls& walls, const ParticleState& state,
-                    const StageInputs* given) {
+OracleAnswer answer(const Scene& scene, const Walls& walls, const WallAnswer& volumes,
+                    const ParticleState& state, const StageInputs* given) {
+  return Bounds(scene, walls, volumes, state, given).take();
+}
+
+OracleAnswer answer(const Scene& scene, const Walls& walls, const ParticleState& state) {
+  return answer(scene, walls, wall_answer(scene, walls), state);
+}
+
+Fields float_fields(const Scene& scene, const Walls& walls, const WallAnswer& volumes,
+                    const ParticleState& state, const StageInputs* given) {
   const PosedWalls posed = pose_walls(scene, walls, scene.time_at(state.substep));
   Neighbors near;
   find_neighbors(scene, state.position, posed.position, NeighborSearch::cells, near);
   Fields fields;
-  evaluate<float>(scene, state, posed, boundary_volumes<float>(scene, walls), near, fields, given);
+  evaluate<float>(scene, state, posed, volumes.float_volume, near, fields, given);
   return fields;
 }
 

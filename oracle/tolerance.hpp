@@ -31,6 +31,13 @@ struct OracleAnswer {
   std::int64_t most_fluid_ambiguous = 0, most_wall_ambiguous = 0;
 };
 
+/// What rigid walls keep whatever the fluid does, M, m³: V_b, tau(V_b) below, and V_b by the oracle's
+/// source in fp32.
+struct WallAnswer {
+  Eigen::VectorXd volume, tolerance, float_volume;
+};
+WallAnswer wall_answer(const Scene& scene, const Walls& walls);
+
 /// Fields, condition sums and tolerances at one state. X_b below is the largest magnitude that the
 /// pose of wall particle b passes through; q = p/rho²; c a component of the acceleration; every
 /// n counts self.
@@ -50,11 +57,12 @@ struct OracleAnswer {
 ///
 /// With `given`, density and pressure are inputs, exact to both sides: their tolerances vanish from
 /// what follows.
-OracleAnswer answer(const Scene& scene, const Walls& walls, const ParticleState& state,
-                    const StageInputs* given = nullptr);
+OracleAnswer answer(const Scene& scene, const Walls& walls, const WallAnswer& volumes,
+                    const ParticleState& state, const StageInputs* given = nullptr);
+OracleAnswer answer(const Scene& scene, const Walls& walls, const ParticleState& state);
 
 /// The oracle's own source in sequential fp32 on the same inputs: what plain single precision costs.
-Fields float_fields(const Scene& scene, const Walls& walls, const ParticleState& state,
-                    const StageInputs* given = nullptr);
+Fields float_fields(const Scene& scene, const Walls& walls, const WallAnswer& volumes,
+                    const ParticleState& state, const StageInputs* given = nullptr);
 
 }  // namespace decant

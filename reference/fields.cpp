@@ -24,12 +24,9 @@ PosedWalls pose_walls(const Scene& scene, const Walls& walls, double time) {
   return posed;
 }
 
-template <class Real>
-Eigen::VectorXd boundary_volumes(const Scene& scene, const Walls& walls) {
-  const Kernel<Real> kernel(scene.kernel, scene.support_radius());
-  const Separation separation(scene.domain);
-  Eigen::VectorXd volumes(walls.size());
-  Eigen::Index b = 0;
+WallNeighbors find_wall_neighbors(const Scene& scene, const Walls& walls) {
+  WallNeighbors all;
+  all.position.resize(3, walls.size());
   Neighbors near;
   for (std::size_t c = 0; c < walls.containers.size(); ++c) {
     const Eigen::Matrix3Xd& x = walls.containers[c].position;
@@ -37,15 +34,34 @@ Eigen::VectorXd boundary_volumes(const Scene& scene, const Walls& walls) {
     local.domain.min -= scene.containers[c].origin;
     local.domain.max -= scene.containers[c].origin;
     find_neighbors(local, x, Eigen::Matrix3Xd(3, 0), NeighborSearch::cells, near);
-    const Eigen::Matrix<Real, 3, Eigen::Dynamic> y = x.cast<Real>();
-    for (Eigen::Index i = 0; i < x.cols(); ++i, ++b) {
-      Real sum = kernel.W(0);
-      for (const auto k : near.fluid[static_cast<std::size_t>(i)])
-        sum += kernel.W(separation(Vector3<Real>(y.col(i)), Vector3<Real>(y.col(k))).norm());
-      volumes[b] = static_cast<double>(1 / sum);
+    const auto first = static_cast<std::int32_t>(all.near.size());
+    all.position.middleCols(first, x.cols()) = x;
+    for (auto& list : near.fluid) {
+      for (auto& b : list) b += first;
+      all.near.push_back(std::move(list));
     }
   }
+  return all;
+}
+
+template <class Real>
+Eigen::VectorXd boundary_volumes(const Scene& scene, const WallNeighbors& neighbors) {
+  const Kernel<Real> kernel(scene.kernel, scene.support_radius());
+  const Separation separation(scene.domain);
+  const Eigen::Matrix<Real, 3, Eigen::Dynamic> x = neighbors.position.cast<Real>();
+  Eigen::VectorXd volumes(x.cols());
+  for (Eigen::Index b = 0; b < x.cols(); ++b) {
+    Real sum = kernel.W(0);
+    for (const auto k : neighbors.near[static_cast<std::size_t>(b)])
+      sum += kernel.W(separation(Vector3<Real>(x.col(b)), Vector3<Real>(x.col(k))).norm());
+    volumes[b] = static_cast<double>(1 / sum);
+  }
   return volumes;
+}
+
+template <class Real>
+Eigen::VectorXd boundary_volumes(const Scene& scene, const Walls& walls) {
+  return boundary_volumes<Real>(scene, find_wall_neighbors(scene, walls));
 }
 
 namespace {
@@ -134,6 +150,8 @@ void evaluate(const Scene& scene, const ParticleState& state, const PosedWalls& 
 
 template Eigen::VectorXd boundary_volumes<double>(const Scene&, const Walls&);
 template Eigen::VectorXd boundary_volumes<float>(const Scene&, const Walls&);
+template Eigen::VectorXd boundary_volumes<double>(const Scene&, const WallNeighbors&);
+template Eigen::VectorXd boundary_volumes<float>(const Scene&, const WallNeighbors&);
 template void evaluate<double>(const Scene&, const ParticleState&, const PosedWalls&,
                                const Eigen::VectorXd&, const Neighbors&, Fields&,
                                const StageInputs*);

@@ -33,7 +33,9 @@ class Separation {
     Vector x_ij = x_i - x_j;
     if (any_)
       for (int a = 0; a < 3; ++a)
-        if (const auto period = static_cast<Real>(period_[a]); period > 0)
+        // Nearer than half a period nothing is to be rounded.
+        if (const auto period = static_cast<Real>(period_[a]);
+            period > 0 && !(std::abs(x_ij[a]) < period / 2))
           x_ij[a] -= period * std::round(x_ij[a] / period);
     return x_ij;
   }

@@ -48,12 +48,16 @@ void collide(const Scene& scene, const std::vector<SolidDistance>& solids, doubl
 
 Solver::Solver(const Scene& scene, const Walls& walls, const ParticleState& state,
                NeighborSearch search)
+    : Solver(scene, walls, state, boundary_volumes<double>(scene, walls), search) {}
+
+Solver::Solver(const Scene& scene, const Walls& walls, const ParticleState& state,
+               const Eigen::VectorXd& volumes, NeighborSearch search)
     : scene_(scene),
       walls_(walls),
       state_(state),
       search_(search),
       solids_(scene.containers.begin(), scene.containers.end()),
-      volumes_(boundary_volumes<double>(scene, walls)) {}
+      volumes_(volumes) {}
 
 void Solver::fields(Fields& out, const StageInputs* given) {
   const PosedWalls posed = pose_walls(scene_, walls_, scene_.time_at(state_.substep));

@@ -28,6 +28,17 @@ PosedWalls pose_walls(const Scene& scene, const Walls& walls, double time);
 template <class Real>
 Eigen::VectorXd boundary_volumes(const Scene& scene, const Walls& walls);
 
+/// Wall particles within H of each other in one container, whose frame they stand still in.
+struct WallNeighbors {
+  Eigen::Matrix3Xd position;  // 3×M, m, each in its container's frame
+  std::vector<std::vector<std::int32_t>> near;  // M lists of b, ascending; self excluded
+};
+WallNeighbors find_wall_neighbors(const Scene& scene, const Walls& walls);
+
+/// boundary_volumes, from neighbors found before.
+template <class Real>
+Eigen::VectorXd boundary_volumes(const Scene& scene, const WallNeighbors& neighbors);
+
 /// All fields of a state (state.hpp), boundary volumes given.
 /// \param volumes  M, m³; \param given  where it holds density or pressure, these are used for what
 /// follows from them instead of the computed ones, which are returned all the same
@@ -55,6 +66,9 @@ class Solver {
  public:
   Solver(const Scene& scene, const Walls& walls, const ParticleState& state,
          NeighborSearch search = NeighborSearch::cells);
+  /// \param volumes  boundary_volumes of the walls, M, m³
+  Solver(const Scene& scene, const Walls& walls, const ParticleState& state,
+         const Eigen::VectorXd& volumes, NeighborSearch search = NeighborSearch::cells);
 
   /// Fields at the present state.
   void fields(Fields& out, const StageInputs* given = nullptr);
