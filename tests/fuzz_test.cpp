@@ -67,6 +67,22 @@ TEST(Genomes, AreOfAllKindsThatPortsTripOver) {
   }
 }
 
+/// Shrunk cases of campaigns that showed a mistake, of a backend or of the judgement.
+TEST(Campaign, WhatItOnceFoundIsSettled) {
+  int count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(DECANT_SOURCE_DIR "/fixtures/found")) {
+    if (entry.path().extension() != ".h5") continue;
+    const Fixture fixture = read_fixture(entry.path());
+    const Judgement oracle = prepare(fixture);
+    for (const char* name : {"brute", "hash", "list", "list:trigger=local"})
+      for (const CheckRow& row : judge(*on_host(name), fixture, oracle))
+        EXPECT_EQ(judged_verdict(row), Verdict::pass)
+            << fixture.name << " " << name << " " << row.check << " " << row.field << ": " << row.reason;
+    ++count;
+  }
+  EXPECT_GT(count, 2);
+}
+
 TEST(Campaign, FindsNothingInWhatIsRight) {
   Settings s = settings_of(48, all_properties());
   s.backends = {"brute", "hash", "list"};

@@ -25,7 +25,7 @@ struct FuzzArguments {
   std::int64_t cases = -1;
   double seconds = 0;
   int threads = 0, most_findings = 16;
-  bool no_shrink = false, quiet = false;
+  bool no_shrink = false, quiet = false, write = false;
 };
 
 std::string footer() {
@@ -45,7 +45,8 @@ std::string footer() {
          "Examples:\n"
          "  decant fuzz --cases 1000\n"
          "  decant fuzz --backend hash --seconds 600 --seed 100001 --report build/fuzz.h5\n"
-         "  decant fuzz --backend list:trigger=local --property lists,substep --cases 10000";
+         "  decant fuzz --backend list:trigger=local --property lists,substep --cases 10000\n"
+         "  decant fuzz --seed 1067584 --write";
 }
 
 std::set<std::string> chosen(const std::vector<std::string>& given) {
@@ -62,6 +63,13 @@ std::set<std::string> chosen(const std::vector<std::string>& given) {
 }
 
 void run(FuzzArguments& arguments, int& exit_status) {
+  if (arguments.write) {
+    const std::string seed = fmt::format("{}", arguments.seed);
+    fmt::print("decant conform {}\n",
+               fuzz::write_problem(arguments.failures, fuzz::random_genome(arguments.seed),
+                                   "fuzz-" + seed, {{"fuzz_seed", seed}}));
+    return;
+  }
   if (arguments.cases < 0 && arguments.seconds <= 0) arguments.cases = 1000;
   if (arguments.seconds < 0)
     throw InputError("command line", "--seconds", fmt::format("{}", arguments.seconds), "> 0");
@@ -141,6 +149,8 @@ void add_fuzz_command(CLI::App& app, int& exit_status) {
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
   verb.add_flag("--no-shrink", arguments->no_shrink, "failures are kept as they are found");
+  verb.add_flag("--write", arguments->write,
+                "only write the problem of --seed into --failures, to look at what a report calls worst");
   verb.add_flag("--quiet", arguments->quiet, "no progress on standard error");
   verb.footer(footer());
   verb.callback([arguments, &exit_status] { run(*arguments, exit_status); });

@@ -7,14 +7,12 @@
 #include "gpu/fault.hpp"
 #include "oracle/conform.hpp"
 #include "tests/faults/fuzz_faults.hpp"
+#include "tests/faults/processes.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <omp.h>
-
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <fstream>
@@ -67,65 +65,19 @@ void say(const CheckRow& row, std::ostream& out) {
   out << row.check << '\t' << row.field << '\t' << row.score << '\n';
 }
 
-/// In the child: judges and writes the failing rows to `to`.
-void judge_into(int to, const Trial& trial, Executor executor, const Prepared& p) {
-  const auto colon = trial.backend.find(':');
-  const auto options = colon == std::string::npos ? "" : trial.backend.substr(colon + 1);
+/// In the child: judges; the failing rows.
+std::string failing_rows(const Trial& trial, Executor executor, const Prepared& p) {
   choose_fault(executor, trial.number);
-  const auto backend = make_backend(trial.backend.substr(0, colon), executor, options);
+  const auto backend = backend_of(trial.backend, executor);
   std::ostringstream out;
   for (const CheckRow& row : judge(*backend, p.fixture, p.oracle, trial.checks)) say(row, out);
-  out << "end\n";
-  const std::string text = out.str();
-  for (std::size_t at = 0; at < text.size();) {
-    const ssize_t written = write(to, text.data() + at, text.size() - at);
-    if (written <= 0) _exit(4);
-    at += static_cast<std::size_t>(written);
-  }
+  return out.str();
 }
 
-struct Child {
-  pid_t pid;
-  int from;
-  std::size_t trial;
-};
-
-Child start(std::size_t index, const Trial& trial, Executor executor, const Prepared& p) {
-  int ends[2];
-  if (pipe(ends) != 0) throw std::runtime_error("no pipe");
-  const pid_t pid = fork();
-  if (pid < 0) throw std::runtime_error("no process");
-  if (pid == 0) {
-    close(ends[0]);
-    alarm(60);
-    try {
-      judge_into(ends[1], trial, executor, p);
-    } catch (const std::exception& error) {
-      std::cerr << trial.number << ": " << error.what() << '\n';
-      _exit(5);
-    }
-    _exit(0);  // no destructors: a broken backend may not survive its own
-  }
-  close(ends[1]);
-  return {pid, ends[0], index};
-}
-
-Outcome outcome_of(const Child& child) {
+Outcome outcome_of(const Said& said) {
   Outcome o;
-  std::string text;
-  char buffer[4096];
-  for (ssize_t n; (n = read(child.from, buffer, sizeof buffer)) > 0;)
-    text.append(buffer, static_cast<std::size_t>(n));
-  close(child.from);
-  int status = 0;
-  waitpid(child.pid, &status, 0);
-  std::istringstream lines(text);
-  bool whole = false;
+  std::istringstream lines(said.text);
   for (std::string line; std::getline(lines, line);) {
-    if (line == "end") {
-      whole = true;
-      continue;
-    }
     std::istringstream columns(line);
     std::string check, field, score;
     std::getline(columns, check, '\t');
@@ -135,25 +87,18 @@ Outcome outcome_of(const Child& child) {
     const auto known = o.failed.find(check);
     if (known == o.failed.end() || !(value <= known->second)) o.failed[check] = value;
   }
-  if (!whole) o.ended = WIFSIGNALED(status) && WTERMSIG(status) == SIGALRM ? "hang" : "crash";
-  o.caught = !o.failed.empty() || !whole;
+  if (!said.ended.empty()) o.ended = said.ended == "hang" ? "hang" : "crash";
+  o.caught = !o.failed.empty() || !o.ended.empty();
   return o;
 }
 
 std::vector<Outcome> run_all(const std::vector<Trial>& trials, Executor executor, int jobs,
                              const std::map<std::string, Prepared>& prepared) {
-  std::vector<Outcome> outcomes(trials.size());
-  std::vector<Child> running;
-  std::size_t next = 0, done = 0;
-  while (done < trials.size()) {
-    while (next < trials.size() && running.size() < static_cast<std::size_t>(jobs)) {
-      running.push_back(start(next, trials[next], executor, prepared.at(trials[next].fixture)));
-      ++next;
-    }
-    outcomes[running.front().trial] = outcome_of(running.front());
-    running.erase(running.begin());
-    ++done;
-  }
+  std::vector<Outcome> outcomes;
+  for (const Said& said : in_processes(trials.size(), jobs, 60, [&](std::size_t k) {
+         return failing_rows(trials[k], executor, prepared.at(trials[k].fixture));
+       }))
+    outcomes.push_back(outcome_of(said));
   return outcomes;
 }
 

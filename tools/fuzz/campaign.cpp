@@ -68,9 +68,9 @@ class Running {
         if (over(k)) break;
         const std::uint64_t seed = s_.first_seed + static_cast<std::uint64_t>(k);
         const Genome genome = random_genome(seed);
-        const Classes classes = classes_of(problem_of(genome, fmt::format("fuzz-{}", seed)));
-        const std::vector<Outcome> outcomes = tester.test(genome, seed);
-        take(classes, outcomes, seed);
+        const Fixture problem = problem_of(genome, fmt::format("fuzz-{}", seed));
+        const std::vector<Outcome> outcomes = tester.test(problem, seed);
+        take(classes_of(problem), outcomes, seed);
         for (const Outcome& outcome : outcomes)
           if (!outcome.holds) find(tester, seed, genome, outcome);
       }
@@ -141,24 +141,31 @@ Campaign run_campaign(const Settings& settings, const BackendMaker& make) {
   return Running(settings, make).run();
 }
 
-std::string write_finding(const std::filesystem::path& folder, const Finding& finding) {
+std::string write_problem(const std::filesystem::path& folder, const Genome& genome,
+                          const std::string& name,
+                          const std::map<std::string, std::string>& provenance) {
   std::filesystem::create_directories(folder);
-  std::string backend = finding.outcome.backend;
-  for (char& c : backend)
-    if (c == ':' || c == '=') c = '-';
-  const std::string name =
-      fmt::format("fuzz-{}-{}-{}", finding.seed, backend, finding.outcome.property);
-  Fixture fixture = problem_of(finding.genome, name);
+  Fixture fixture = problem_of(genome, name);
   fixture.provenance = build_provenance();
-  fixture.provenance["fuzz_seed"] = fmt::format("{}", finding.seed);
-  fixture.provenance["fuzz_property"] = finding.outcome.property;
-  fixture.provenance["fuzz_backend"] = finding.outcome.backend;
-  fixture.provenance["fuzz_reason"] = finding.outcome.reason;
-  (void)record_answer(fixture, 32, 24);
+  for (const auto& [key, text] : provenance) fixture.provenance[key] = text;
+  (void)record_answer(fixture, run_substeps, run_members);
   const auto file = folder / (name + ".h5");
   write_fixture(file, fixture);
   std::ofstream(folder / (name + ".json")) << scene_to_json(fixture.scene);
   return file.string();
+}
+
+std::string write_finding(const std::filesystem::path& folder, const Finding& finding) {
+  std::string backend = finding.outcome.backend;
+  for (char& c : backend)
+    if (c == ':' || c == '=') c = '-';
+  return write_problem(
+      folder, finding.genome,
+      fmt::format("fuzz-{}-{}-{}", finding.seed, backend, finding.outcome.property),
+      {{"fuzz_seed", fmt::format("{}", finding.seed)},
+       {"fuzz_property", finding.outcome.property},
+       {"fuzz_backend", finding.outcome.backend},
+       {"fuzz_reason", finding.outcome.reason}});
 }
 
 }  // namespace decant::fuzz

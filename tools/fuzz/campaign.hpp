@@ -9,12 +9,16 @@
 #include <array>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <set>
 #include <string>
 #include <vector>
 
 namespace decant::fuzz {
+
+/// How long a problem's runs are, and how many disturbed ones say how far correct runs are apart.
+inline constexpr int run_substeps = 8, run_members = 8;
 
 /// A property that every problem has to have.
 struct Property {
@@ -46,7 +50,7 @@ class Tester {
 
   /// Holds one problem to all properties whose turn it is. Empty `outcomes`: fp32 cannot tell this
   /// problem's neighbors apart, and no property is asked.
-  std::vector<Outcome> test(const Genome& genome, std::uint64_t seed);
+  std::vector<Outcome> test(const Fixture& problem, std::uint64_t seed);
   /// One property of one backend, whosever turn it is.
   Outcome test_one(const Genome& genome, std::uint64_t seed, const Outcome& like);
 
@@ -116,8 +120,11 @@ struct Campaign {
 /// Runs. The same seeds give the same tallies, whatever the number of threads.
 Campaign run_campaign(const Settings& settings, const BackendMaker& make);
 
-/// Writes the finding's problem with the oracle's answer, for `decant conform`, and its scene beside it;
-/// returns the fixture's file.
+/// Writes a problem with the oracle's answer, for `decant conform`, and its scene beside it; returns the
+/// fixture's file.
+std::string write_problem(const std::filesystem::path& folder, const Genome& genome,
+                          const std::string& name,
+                          const std::map<std::string, std::string>& provenance);
 std::string write_finding(const std::filesystem::path& folder, const Finding& finding);
 
 /// Table for people.

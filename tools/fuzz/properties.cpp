@@ -20,8 +20,6 @@
 namespace decant::fuzz {
 namespace {
 
-constexpr int run_substeps = 8, run_members = 8;
-
 /// The checks of `conform` that are properties as they are.
 const std::set<std::string> checked = {"fields",       "substep",     "trajectory",
                                        "mass",         "containment", "conservation",
@@ -226,14 +224,13 @@ Backend& Tester::backend(const std::string& choice) {
   return *made_.emplace_back(choice, make_(choice)).second;
 }
 
-std::vector<Outcome> Tester::test(const Genome& genome, std::uint64_t seed) {
+std::vector<Outcome> Tester::test(const Fixture& problem, std::uint64_t seed) {
   std::set<std::string> wanted;
   for (const Property& property : properties())
     if (properties_.contains(property.name) &&
         (every_problem_ || seed % static_cast<std::uint64_t>(property.every) == 0))
       wanted.insert(property.name);
-  return outcomes(problem_of(genome, fmt::format("fuzz-{}", seed)), seed,
-                  {names_.begin(), names_.end()}, wanted);
+  return outcomes(problem, seed, {names_.begin(), names_.end()}, wanted);
 }
 
 Outcome Tester::test_one(const Genome& genome, std::uint64_t seed, const Outcome& like) {
@@ -304,9 +301,7 @@ std::vector<Outcome> Tester::outcomes(const Fixture& problem, std::uint64_t seed
         [&] { return sequence(backend(name), name, fixture, oracle.walls, seed); });
     if (name.starts_with("list") && name.find("rebuild=") == std::string::npos)
       ask(name, "lists", [&] {
-        const std::string verified =
-            name + ":verify=on";
-        return lists(backend(verified), name, fixture, oracle.walls);
+        return lists(backend(name + ":verify=on"), name, fixture, oracle.walls);
       });
   }
   return all;
