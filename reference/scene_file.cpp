@@ -371,7 +371,12 @@ Scene load_scene(const std::filesystem::path& file, std::vector<std::string>* wa
   std::ifstream in(file, std::ios::binary);
   if (std::filesystem::is_directory(file, ignored) || !in)
     throw InputError(name, "(whole file)", "not readable", "a scene file");
-  const std::string text{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  return complete_scene({std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()}, name,
+                        warnings);
+}
+
+Scene complete_scene(const std::string& text, const std::string& name,
+                     std::vector<std::string>* warnings) {
   Scene scene = parse_scene(text, name);
   try {
     if (scene.schedule.substeps_derived) scene.schedule.substeps_per_frame = substeps_for(scene);

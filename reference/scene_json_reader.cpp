@@ -46,7 +46,7 @@ class Whereabouts {
       case json::parse_event_t::key: {
         Level& level = levels_.back();
         level.key = parsed.get<std::string>();
-        if (!level.keys.insert(level.key).second)
+        if (!level.keys.insert(*level.key).second)
           throw InputError(file_, path(), "given twice", "a key may stand once in an object");
         break;
       }
@@ -71,8 +71,8 @@ class Whereabouts {
     for (const auto& level : levels_)
       if (level.is_array)
         path += "[" + std::to_string(level.index) + "]";
-      else if (!level.key.empty())
-        path = member_path(path, level.key);
+      else if (level.key)
+        path = member_path(path, *level.key);
     return path;
   }
 
@@ -80,7 +80,7 @@ class Whereabouts {
   struct Level {
     bool is_array;
     std::size_t index;
-    std::string key;
+    std::optional<std::string> key;  // none before the first; the empty one is a key
     std::set<std::string> keys;
   };
 

@@ -245,6 +245,11 @@ TEST(SceneFile, RefusesAKeyThatStandsTwiceInOneObject) {
   EXPECT_EQ(error.value(), "given twice");
 }
 
+TEST(SceneFile, NamesTheEmptyKey) {
+  for (const char* text : {R"({"": 1, "": 2})", R"({"": 1e999})", R"({"": ]})"})
+    EXPECT_EQ(refusal_of([&] { parse_scene(text, "empty.json"); }).key(), R"("")") << text;
+}
+
 TEST(SceneFile, NamesLineAndColumnOfBadSyntax) {
   const InputError error = refusal_of(
       [] { parse_scene("{\n  // half a scene\n  \"fluid\": {\"a\": 1,]\n}", "s.json"); });
