@@ -69,14 +69,15 @@ FieldDeficit deficit(const Matrix& whole, const Matrix& partial, const Matrix& t
 
 }  // namespace
 
-Instant look_at(const Scene& scene, const Walls& walls, const Eigen::VectorXd& volumes,
+Instant look_at(const Scene& scene, const Walls& walls, const WallAnswer& volumes,
                 const ParticleState& state) {
   Instant now;
   now.state = state;
   now.walls = pose_walls(scene, walls, scene.time_at(state.substep));
   find_neighbors(scene, state.position, now.walls.position, NeighborSearch::cells, now.near);
-  evaluate<double>(scene, state, now.walls, volumes, now.near, now.fields);
-  now.tolerance = answer(scene, walls, state).tolerance;
+  OracleAnswer complete = answer(scene, walls, volumes, state);
+  now.fields = std::move(complete.fields);
+  now.tolerance = std::move(complete.tolerance);
   return now;
 }
 

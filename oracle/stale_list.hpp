@@ -56,8 +56,8 @@ struct Instant {
   Fields tolerance;     // of a backend in fp32
 };
 
-/// The oracle's view of a state. \param volumes  M, m³, of the wall particles
-Instant look_at(const Scene& scene, const Walls& walls, const Eigen::VectorXd& volumes,
+/// The oracle's view of a state. \param volumes  of the wall particles
+Instant look_at(const Scene& scene, const Walls& walls, const WallAnswer& volumes,
                 const ParticleState& state);
 
 /// The list of pairs closer than (1 + skin) H at its build.

@@ -186,8 +186,8 @@ TEST(Lists, VerifiedCountWhatTheOracleCounts) {
   for (const std::uint32_t seed : {2u, 3u, 5u, 8u}) {
     const Fixture f = test::random_fixture(seed);
     const Walls walls = sample_walls(f.scene);
-    const Eigen::VectorXd volumes = boundary_volumes<double>(f.scene, walls);
-    const StaleList built(f.scene, volumes, look_at(f.scene, walls, volumes, f.state), 0);
+    const WallAnswer volumes = wall_answer(f.scene, walls);
+    const StaleList built(f.scene, volumes.volume, look_at(f.scene, walls, volumes, f.state), 0);
     PairTotals expected;
     for (int age = 0; age < 6; ++age) {
       const auto list = test::make_variant("list:rebuild=6:skin=0", Executor::host);

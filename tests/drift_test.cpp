@@ -229,7 +229,7 @@ class Series : public testing::Test {
   Series()
       : fixture_(test::random_fixture(4)),
         walls_(sample_walls(fixture_.scene)),
-        volumes_(boundary_volumes<double>(fixture_.scene, walls_)),
+        volumes_(wall_answer(fixture_.scene, walls_)),
         file_(folder_ / "series.h5"),
         out_(std::make_unique<Hdf5Writer>(file_)) {
     fixture_.name = "random";
@@ -287,7 +287,7 @@ class Series : public testing::Test {
   test::TemporaryFolder folder_;
   Fixture fixture_;
   Walls walls_;
-  Eigen::VectorXd volumes_;
+  WallAnswer volumes_;
   std::filesystem::path file_;
   std::unique_ptr<Hdf5Writer> out_;
   std::vector<Instant> instants_;
@@ -300,7 +300,7 @@ TEST_F(Series, IsLookedAtAsOurOwnListsAre) {
   const DriftResult result = read();
   ASSERT_EQ(result.samples.size(), 4u);
   for (const std::size_t built : {0u, 2u}) {
-    const StaleList own(fixture_.scene, volumes_, instants_[built], 0);
+    const StaleList own(fixture_.scene, volumes_.volume, instants_[built], 0);
     for (const std::size_t age : {0u, 1u}) {
       const Staleness expected = own.at(instants_[built + age]),
                       got = result.samples[built + age].stale;

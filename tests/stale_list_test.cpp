@@ -17,15 +17,15 @@ struct Problem {
   explicit Problem(const Fixture& f)
       : scene(f.scene),
         walls(sample_walls(f.scene)),
-        volumes(boundary_volumes<double>(f.scene, walls)),
+        volumes(wall_answer(f.scene, walls)),
         state(f.state) {}
 
   Instant look() const { return look_at(scene, walls, volumes, state); }
-  StaleList list(double skin) const { return {scene, volumes, look(), skin}; }
+  StaleList list(double skin) const { return {scene, volumes.volume, look(), skin}; }
 
   Scene scene;
   Walls walls;
-  Eigen::VectorXd volumes;
+  WallAnswer volumes;
   ParticleState state;
 };
 
@@ -200,10 +200,10 @@ TEST_P(DeficitGrowth, IsWhatTheoryExpectsFromSpeedsAlone) {
   const double H = p.scene.support_radius();
   p.state.velocity = random_steps(p.state.size(), 1, 3);
   const Instant start = p.look();
-  const PairsNearEdge near = pairs_near_edge(p.scene, p.volumes, start);
+  const PairsNearEdge near = pairs_near_edge(p.scene, p.volumes.volume, start);
   EXPECT_NEAR(near.neighbors, 8000 / 0.008 * 4 / 3 * M_PI * H * H * H, 0.5);
   for (const double skin : {0.0, 0.03}) {
-    const StaleList list(p.scene, p.volumes, start, skin);
+    const StaleList list(p.scene, p.volumes.volume, start, skin);
     const double seconds = 0.1 * H;
     p.state.position = start.state.position + seconds * start.state.velocity;
     for (double& x : p.state.position.reshaped()) x -= 0.2 * std::floor(x / 0.2);
@@ -221,7 +221,7 @@ TEST_P(DeficitGrowth, IsWhatTheoryExpectsFromSpeedsAlone) {
 TEST(ListTheory, FindsTheSkinThatKeepsATolerance) {
   std::srand(2);
   Problem p = gas(KernelFamily::cubic_spline);
-  const PairsNearEdge near = pairs_near_edge(p.scene, p.volumes, p.look());
+  const PairsNearEdge near = pairs_near_edge(p.scene, p.volumes.volume, p.look());
   const double seconds = 0.2 * p.scene.support_radius();
   double before = 1;
   for (const double tolerance : {1e-5, 1e-4, 1e-3, 1e-2}) {

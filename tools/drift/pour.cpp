@@ -14,7 +14,7 @@ namespace decant {
 PourDrift along_pour(const Scene& scene, const DriftPlan& plan, int looks,
                      const ListMaker& make_list, std::vector<Fixture>& phases) {
   const Walls walls = sample_walls(scene);
-  const Eigen::VectorXd volumes = boundary_volumes<double>(scene, walls);
+  const WallAnswer volumes = wall_answer(scene, walls);
   const std::int64_t all =
       std::int64_t{scene.schedule.frames} * scene.schedule.substeps_per_frame;
   std::set<int> ages = {0};
@@ -65,7 +65,7 @@ PourDrift along_pour(const Scene& scene, const DriftPlan& plan, int looks,
       const auto at = static_cast<std::size_t>(
           std::distance(ages.begin(), ages.find(list.interval - 1)));
       const Staleness stale =
-          StaleList(scene, volumes, instants.front(), list.skin).at(instants[at]);
+          StaleList(scene, volumes.volume, instants.front(), list.skin).at(instants[at]);
       moments[static_cast<std::size_t>(k)] = {
           scene.time_at(built),
           {list, built + list.interval - 1, stale,

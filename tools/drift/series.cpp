@@ -56,7 +56,7 @@ DriftResult measure_series(const Fixture& fixture, const std::filesystem::path& 
     in.fail("/@decant_list_series", fmt::format("{}", schema), "1");
   const Scene& scene = fixture.scene;
   const Walls walls = sample_walls(scene);
-  const Eigen::VectorXd volumes = boundary_volumes<double>(scene, walls);
+  const WallAnswer volumes = wall_answer(scene, walls);
   const auto n = fixture.state.size();
   const auto states = static_cast<std::int64_t>(in.children("/state").size());
   if (states == 0) in.fail("/state", "empty", "groups 0, 1, …, one a state");
@@ -91,7 +91,7 @@ DriftResult measure_series(const Fixture& fixture, const std::filesystem::path& 
       Neighbors listed;
       listed.fluid = read_lists(in, group + "/fluid", n, n, true);
       listed.wall = read_lists(in, group + "/wall", n, walls.size(), false);
-      list = lists.emplace(used[k], StaleList(scene, volumes, then->second, std::move(listed)))
+      list = lists.emplace(used[k], StaleList(scene, volumes.volume, then->second, std::move(listed)))
                  .first;
     }
     const Staleness stale = list->second.at(instants[substeps[k]]);

@@ -200,9 +200,9 @@ std::vector<ListChoice> derived_lists(const std::vector<Fixture>& fixtures,
   for (const int interval : intervals) lists.push_back({interval, 0, true});
   for (const Fixture& fixture : fixtures) {
     const Walls walls = sample_walls(fixture.scene);
-    const Eigen::VectorXd volumes = boundary_volumes<double>(fixture.scene, walls);
+    const WallAnswer volumes = wall_answer(fixture.scene, walls);
     const PairsNearEdge near = pairs_near_edge(
-        fixture.scene, volumes, look_at(fixture.scene, walls, volumes, fixture.state));
+        fixture.scene, volumes.volume, look_at(fixture.scene, walls, volumes, fixture.state));
     for (ListChoice& list : lists) {
       const double age = (list.interval - 1) * fixture.scene.time_step();
       const double skin = skin_for(fixture.scene, near, age, tolerance);
@@ -217,7 +217,7 @@ DriftResult measure_drift(const Fixture& fixture, const DriftPlan& plan,
   const auto start = Clock::now();
   const Scene& scene = fixture.scene;
   const Walls walls = sample_walls(scene);
-  const Eigen::VectorXd volumes = boundary_volumes<double>(scene, walls);
+  const WallAnswer volumes = wall_answer(scene, walls);
   DriftResult result;
   result.fixture = fixture.name;
   result.particle_spacing = scene.particle_spacing;
@@ -233,12 +233,12 @@ DriftResult measure_drift(const Fixture& fixture, const DriftPlan& plan,
   std::vector<Build> builds = builds_of(plan);
   in_parallel(static_cast<int>(builds.size()), [&](int k) {
     Build& build = builds[static_cast<std::size_t>(k)];
-    const StaleList list(scene, volumes, window[static_cast<std::size_t>(build.built)], build.skin);
+    const StaleList list(scene, volumes.volume, window[static_cast<std::size_t>(build.built)], build.skin);
     for (int now = build.built; now <= build.last; ++now)
       build.ages.push_back(list.at(window[static_cast<std::size_t>(now)]));
   });
 
-  const PairsNearEdge near = pairs_near_edge(scene, volumes, window.front());
+  const PairsNearEdge near = pairs_near_edge(scene, volumes.volume, window.front());
   for (const ListChoice& list : plan.lists) {
     std::vector<DriftSample> samples;
     for (int k = 0; k < plan.window; ++k) {
