@@ -1,11 +1,11 @@
 /// \file
-/// Children that are forked, say what they have to by a pipe, and are waited for in order.
+/// Children that are forked and say what they have to by a pipe. One that hangs holds up no other.
 #include "tests/faults/processes.hpp"
 
+#include <poll.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <deque>
 #include <iostream>
 #include <stdexcept>
 
@@ -15,6 +15,7 @@ namespace {
 struct Child {
   pid_t pid;
   int from;
+  std::size_t k;
 };
 
 /// In the child. No destructors: a broken backend may not survive its own.
@@ -45,35 +46,48 @@ Child begin(std::size_t k, unsigned seconds, const std::function<std::string(std
     say_into(ends[1], k, say);
   }
   close(ends[1]);
-  return {pid, ends[0]};
+  return {pid, ends[0], k};
 }
 
-Said end(const Child& child) {
-  Said said;
-  char buffer[4096];
-  for (ssize_t n; (n = read(child.from, buffer, sizeof buffer)) > 0;)
-    said.text.append(buffer, static_cast<std::size_t>(n));
+/// "": well.
+std::string end_of(const Child& child) {
   close(child.from);
   int status = 0;
   waitpid(child.pid, &status, 0);
-  if (WIFSIGNALED(status))
-    said.ended = WTERMSIG(status) == SIGALRM ? "hang" : "crash";
-  else if (WEXITSTATUS(status) != 0)
-    said.ended = "failed";
-  return said;
+  if (WIFSIGNALED(status)) return WTERMSIG(status) == SIGALRM ? "hang" : "crash";
+  return WEXITSTATUS(status) == 0 ? "" : "failed";
+}
+
+/// Those that have something to say, or have ended.
+std::vector<Child> heard_from(const std::vector<Child>& running) {
+  std::vector<pollfd> ends;
+  for (const Child& child : running) ends.push_back({child.from, POLLIN, 0});
+  if (poll(ends.data(), ends.size(), -1) < 0) throw std::runtime_error("no answer");
+  std::vector<Child> heard;
+  for (std::size_t i = 0; i < ends.size(); ++i)
+    if (ends[i].revents != 0) heard.push_back(running[i]);
+  return heard;
 }
 
 }  // namespace
 
 std::vector<Said> in_processes(std::size_t count, int jobs, unsigned seconds,
                                const std::function<std::string(std::size_t)>& say) {
-  std::vector<Said> all;
-  std::deque<Child> running;
-  for (std::size_t next = 0; all.size() < count;) {
+  std::vector<Said> all(count);
+  std::vector<Child> running;
+  for (std::size_t next = 0; next < count || !running.empty();) {
     for (; next < count && running.size() < static_cast<std::size_t>(jobs); ++next)
       running.push_back(begin(next, seconds, say));
-    all.push_back(end(running.front()));
-    running.pop_front();
+    for (const Child& child : heard_from(running)) {
+      char buffer[4096];
+      const ssize_t n = read(child.from, buffer, sizeof buffer);
+      if (n > 0) {
+        all[child.k].text.append(buffer, static_cast<std::size_t>(n));
+        continue;
+      }
+      all[child.k].ended = end_of(child);
+      std::erase_if(running, [&](const Child& other) { return other.k == child.k; });
+    }
   }
   return all;
 }
