@@ -17,7 +17,8 @@ struct Particles {
 /// What the device tells the host, read once an advance.
 struct Mailbox {
   unsigned long long non_finite, escaped;  // (substep << 32) | smallest id; all ones: none
-  unsigned substep;                        // under way, from 1 within this advance
+  unsigned begun, ended;                   // substeps of this advance whose densities, and whose end
+                                           // positions, are known or being found
   int longest_list;                        // entries that the longest list needs
   int rebuilds;
   int stale;                               // neighbors must be looked for anew
@@ -42,10 +43,15 @@ struct Arrays {
   const DevicePose* poses;  // containers × (substeps + 1), substep major
   int containers;
 
-  DECANT_DEVICE const DevicePose* poses_at_end() const {
-    return poses + static_cast<std::size_t>(mailbox->substep) * static_cast<std::size_t>(containers);
+  /// At the start of the substep, for all that comes before integration, and at its end, for all that
+  /// comes after the densities: the one counts what has ended, the other what has begun.
+  DECANT_DEVICE const DevicePose* poses_before() const { return poses_of(mailbox->ended); }
+  DECANT_DEVICE const DevicePose* poses_after() const { return poses_of(mailbox->begun); }
+
+ private:
+  DECANT_DEVICE const DevicePose* poses_of(unsigned substep) const {
+    return poses + static_cast<std::size_t>(substep) * static_cast<std::size_t>(containers);
   }
-  DECANT_DEVICE const DevicePose* poses_now() const { return poses_at_end() - containers; }
 };
 
 /// Results of `evaluate`, by id. Vectors are [n,3].

@@ -53,6 +53,11 @@ struct CellTable {
     if (spill <= 0) return {start[at + first], start[at + first + 5], 0, 0};
     return {start[at + first], start[at + wrap[0]], start[at], start[at + spill]};
   }
+  /// Whether its rows go around the table's end.
+  DECANT_DEVICE bool goes_around(int bucket) const {
+    return wrap[0] > 5 && around_end(cell_of(bucket).x - 2, wrap[0]) + 5 > wrap[0];
+  }
+  static constexpr int rows = 9;
   /// Cells that a reach spans along an axis, beyond the one it begins in.
   DECANT_BOTH static int beyond(int axis) { return axis == 0 ? 2 : 1; }
   /// Whether a bucket is a cell's, and no padding of the table's.

@@ -6,6 +6,25 @@
 
 namespace decant::gpu::DECANT_EXECUTOR {
 
+/// The rows of cells around a group's particle, in shared memory: each is found by one of its lanes.
+template <class Team>
+class RunTable {
+ public:
+  DECANT_DEVICE int2& run(int r) {
+#ifdef __CUDACC__
+    __shared__ int2 all[group_block / Team::lanes * CellTable::rows];
+    return all[static_cast<int>(threadIdx.x) / Team::lanes * CellTable::rows + r];
+#else
+    return all_[r];
+#endif
+  }
+
+#ifndef __CUDACC__
+ private:
+  int2 all_[CellTable::rows];
+#endif
+};
+
 /// Writes the lists, fluid and wall neighbors alike: near a wall its particles take the place of the
 /// missing fluid, so one short capacity serves both. Evaluates nothing: hits are rare among candidates,
 /// and a kernel evaluated for one lane in ten costs as much as for all. Lanes need not agree on
@@ -18,6 +37,7 @@ struct CollectPass {
   Particles sorted;  // the fluid; wall particles are in a.now
   Lists lists;
   Particles copies;  // where the fluid goes as well; null: nowhere
+  const float4* origin;  // FluidSource's; null: nothing is known of walls
 
   template <class Team>
   DECANT_DEVICE void operator()(Team& team) const {
@@ -27,66 +47,131 @@ struct CollectPass {
     // Without skin exactly what the passes take for a neighbor.
     const float reach2 = reach * reach > c.H2 ? reach * reach : c.H2;
     Shelf shelf{i, xyz(own), reach2, lists.words(i, team.lane()), {}, 0};
-    candidates.around<periodic>(team.lane(), Team::lanes, shelf.x, a.poses_now(),
-                                [&](Candidates::Run run) DECANT_INLINE {
-      if (run.listed)
-        search<Team::lanes>(shelf, run.begin, run.end,
-                            [&](int k) DECANT_INLINE { return read_only(run.listed + k); },
-                            a.now.position);
-      else
-        search<1>(shelf, run.begin, run.end, [](int k) DECANT_INLINE { return k; },
-                  run.begin < a.base ? sorted.position : a.now.position);
-    });
-    lists.count_of(i, team.lane()) = shelf.count;
-    if (shelf.count > lists.capacity) atomic_maximum(&a.mailbox->longest_list, shelf.count);
-    while (shelf.count % 4 != 0) put(shelf, lists.ghost);
+    fluid(team, shelf);
+    if (!far_from_walls(i, shelf.x))
+      candidates.walls_around<periodic>(team.lane(), shelf.x, a.poses_before(),
+                                        [&](Candidates::Run run) DECANT_INLINE {
+        if (run.listed)
+          walls<true, Team::lanes>(shelf, run);
+        else
+          walls<false, Team::lanes>(shelf, run);
+      });
+    const int count = shelf.sent + shelf.box.held();
+    lists.count_of(i, team.lane()) = count;
+    if (count > lists.capacity) atomic_maximum(&a.mailbox->longest_list, count);
+    while (shelf.box.held() % 4 != 0) shelf.box.put(true, lists.ghost);
+    send(shelf, Outbox::room);
     if (!copies.position || !team.leads()) return;
     copies.position[i] = own;
     copies.velocity[i] = sorted.velocity[i];
   }
 
  private:
+  /// Whether it is more than H and the skin away from all solids, and so from their particles.
+  DECANT_DEVICE bool far_from_walls(int i, Float3 x) const {
+    if (!origin) return false;
+    const float rounding = 0x1p-19f * (fabsf(x.x) + fabsf(x.y) + fabsf(x.z));
+    return origin[i].w - rounding > 1.001f * a.mailbox->skin;
+  }
   /// A lane's list on its way; counts on where there is no more room.
   struct Shelf {
     int i;
     Float3 x;
     float reach2;
     int4* word;
-    int4 last;  // the word being filled
-    int count;
+    Outbox box;
+    int sent;
   };
 
-  /// Candidates k, k + step, … before `end`. Written for few instructions a candidate: this is where a
-  /// hash spends its time. (Marking hits in a mask and writing them after the row took longer.)
-  template <int step, class Index>
-  DECANT_DEVICE void search(Shelf& shelf, int k, int end, Index index, const float4* points) const {
-    constexpr int batch = 4;
+  static constexpr int batch = 4;
+
+  /// Rows of cells one after the other as if they were one, so that points are always under way while
+  /// others are tested. Written for few instructions a candidate: this is where a hash spends its time.
+  /// (Marking hits in a mask and writing them after the row took longer.)
+  template <class Team>
+  DECANT_DEVICE void fluid(Team& team, Shelf& shelf) const {
+    const int bucket = candidates.all_fluid ? 0 : candidates.table.bucket_of(shelf.x);
+    const bool twice = !candidates.all_fluid && candidates.table.goes_around(bucket);
+    RunTable<Team> table;
 #pragma unroll 1
-    for (; k + (batch - 1) * step < end; k += batch * step) {
+    for (int part = 0; part < (twice ? 2 : 1); ++part) {
+      for (int r = team.lane(); r < CellTable::rows; r += Team::lanes) {
+        if (candidates.all_fluid) {
+          table.run(r) = make_int2(0, r == 0 ? a.n : 0);
+          continue;
+        }
+        const CellTable::Range row = candidates.table.row<periodic>(bucket, r);
+        table.run(r) = part == 0 ? make_int2(row.begin, row.end) : make_int2(row.begin2, row.end2);
+      }
+      team.sync();
+      int r = -1, k = 0, end = 0;
+      const auto advance = [&]() DECANT_INLINE {
+        k += batch * Team::lanes;
+        while (k >= end && ++r < CellTable::rows) {
+          const int2 run = table.run(r);
+          k = run.x + team.lane();
+          end = run.y;
+        }
+      };
+      // Tests one batch while the next one, or at the end anything, is on its way.
+      const auto step = [&](const float4 (&now)[batch], float4 (&next)[batch]) DECANT_INLINE {
+        const int first = k, last = end;
+        advance();
+        load<Team::lanes>(r < CellTable::rows ? k : 0, next);
+        send(shelf, batch);
+#pragma unroll
+        for (int b = 0; b < batch; ++b) {
+          const int j = first + b * Team::lanes;
+          test(shelf, j, now[b], (j < last) & (j != shelf.i));
+        }
+        return r < CellTable::rows;
+      };
+      advance();
+      float4 even[batch], odd[batch];
+      load<Team::lanes>(r < CellTable::rows ? k : 0, even);
+      if (r < CellTable::rows)
+#pragma unroll 1
+        while (step(even, odd) && step(odd, even)) {
+        }
+      team.sync();
+    }
+  }
+  template <int step>
+  DECANT_DEVICE void load(int k, float4 (&points)[batch]) const {
+#pragma unroll
+    for (int b = 0; b < batch; ++b) points[b] = read_only(sorted.position + k + b * step);
+  }
+  template <bool listed, int step>
+  DECANT_DEVICE void walls(Shelf& shelf, Candidates::Run run) const {
+#pragma unroll 1
+    for (int k = run.begin; k < run.end; k += batch * step) {
       int j[batch];
       float4 other[batch];
+      send(shelf, batch);
 #pragma unroll
-      for (int b = 0; b < batch; ++b) j[b] = index(k + b * step);
+      for (int b = 0; b < batch; ++b) {
+        j[b] = k + b * step;
+        if constexpr (listed) j[b] = read_only(run.listed + (j[b] < run.end ? j[b] : k));
+      }
 #pragma unroll
-      for (int b = 0; b < batch; ++b) other[b] = read_only(points + j[b]);
+      for (int b = 0; b < batch; ++b) other[b] = read_only(a.now.position + j[b]);
 #pragma unroll
-      for (int b = 0; b < batch; ++b) test(shelf, j[b], other[b]);
-    }
-#pragma unroll 1
-    for (; k < end; k += step) {
-      const int j = index(k);
-      test(shelf, j, read_only(points + j));
+      for (int b = 0; b < batch; ++b) test(shelf, j[b], other[b], k + b * step < run.end);
     }
   }
-  DECANT_DEVICE void test(Shelf& shelf, int j, float4 other) const {
+  /// No short cuts: a branch costs more than what it saves.
+  DECANT_DEVICE void test(Shelf& shelf, int j, float4 other, int there) const {
     const Float3 d = nearest_image<periodic>(c, shelf.x - xyz(other));
-    if (dot(d, d) < shelf.reach2 && j != shelf.i) put(shelf, j);
+    const int near = dot(d, d) < shelf.reach2;
+    shelf.box.put(near & there, j);
   }
-  DECANT_DEVICE void put(Shelf& shelf, int j) const {
-    shelf.last = make_int4(shelf.last.y, shelf.last.z, shelf.last.w, j);
-    if (++shelf.count % 4 != 0) return;
-    if (shelf.count <= lists.capacity) *shelf.word = shelf.last;
-    shelf.word += lists.lanes;
+  /// So that there is room for `more`.
+  DECANT_DEVICE void send(Shelf& shelf, int more) const {
+    shelf.box.relieve(more, [&](int4 word) DECANT_INLINE {
+      if (shelf.sent < lists.capacity) *shelf.word = word;
+      shelf.word += lists.lanes;
+      shelf.sent += 4;
+    });
   }
 };
 

@@ -70,31 +70,26 @@ class GridSearch {
   void density(Queue& queue, const Arrays& a, const DeviceGeometry& geometry,
                const FieldArrays& out, const Laps& laps) {
     if (reuses_)
-      queue.when(&a.mailbox->stale, &a.mailbox->substep,
-                 [&] { build<periodic>(queue, a, geometry, laps); });
+      queue.when(&a.mailbox->stale, [&] { build<periodic>(queue, a, geometry, laps); });
     else
       build<periodic>(queue, a, geometry, laps);
     if (o_.verify)
       with_lanes(lanes_, [&](auto lanes) {
         verifier_.template count<decltype(lanes)::value>(
-            queue, c_, a, candidates(a), ListQuery<periodic>{{c_, a.base}, lists(a)},
-            o_.rebuild == 0, scratch_);
+            queue, c_, a, candidates(a), list_query<periodic>(a), o_.rebuild == 0, scratch_);
       });
-    if (keeps_pairs())
-      run<periodic, facts>(queue, a, out, ListQuery<periodic>{{c_, a.base}, lists(a)});
-    else
-      run<periodic, facts>(queue, a, out, cell_query<periodic>(a));
+    with_query<periodic>(a, [&](auto lanes, const auto& query) {
+      using Pass = DensityPass<std::decay_t<decltype(query)>, facts>;
+      queue.for_each_group<decltype(lanes)::value>(n_, Pass{c_, a, query, out, walls_.walls.id});
+    });
     laps.density();
   }
 
   template <bool periodic, bool facts>
   void force(Queue& queue, const Arrays& a, const FieldArrays& out, const Laps& laps) {
-    with_lanes(lanes_, [&](auto lanes) {
-      if (keeps_pairs())
-        force_by<decltype(lanes)::value, facts>(queue, a, out,
-                                                ListQuery<periodic>{{c_, a.base}, lists(a)});
-      else
-        force_by<decltype(lanes)::value, facts>(queue, a, out, cell_query<periodic>(a));
+    with_query<periodic>(a, [&](auto lanes, const auto& query) {
+      using Pass = ForcePass<std::decay_t<decltype(query)>, facts>;
+      queue.for_each_group<decltype(lanes)::value>(n_, Pass{c_, a, query, out});
     });
     laps.force();
     // The ids are in the order of the cells now; so must be the state, which stays as it is.
@@ -105,20 +100,20 @@ class GridSearch {
   }
 
   template <bool periodic>
-  void move(Queue& queue, const Arrays& a, const DeviceGeometry& geometry, const Laps& laps) {
-    const PosePass moving = walls_.moving(a);
-    const int threads = n_ + walls_.moving_count();
-    if (reuses_) {
-      const Watch w = watch();
-      queue.for_each(threads, IntegratePass<WatchParticle<periodic>>{c_, a, geometry, moving,
-                                                                     {c_, a, w}});
-      if (w.trigger == Trigger::local) queue.for_each(w.supers, ComparePass{w, a.mailbox});
-    } else if (counts_ahead()) {
-      const CountCell count{fluid_.counter(fluid_source(a, geometry), scratch_)};
-      queue.for_each(threads, IntegratePass<CountCell>{c_, a, geometry, moving, count});
-    } else {
-      queue.for_each(threads, IntegratePass<Nothing>{c_, a, geometry, moving, {}});
-    }
+  void move(Queue& queue, const Arrays& a, const DeviceGeometry& geometry, const Laps& laps,
+            bool more) {
+    const Watch w = watch(queue, more);
+    const auto run = [&](const auto& after) {
+      using Pass = IntegratePass<std::decay_t<decltype(after)>>;
+      queue.for_each(n_ + walls_.moving_count(), Pass{c_, a, geometry, walls_.moving(a), after});
+    };
+    if (reuses_)
+      run(WatchParticle<periodic>{c_, a, w});
+    else if (counts_ahead())
+      run(CountCell{fluid_.counter(fluid_source(a, geometry), scratch_)});
+    else
+      run(Nothing{});
+    if (w.trigger == Trigger::local) queue.for_each(w.supers, ComparePass{w, a.mailbox});
     laps.integrate();
   }
 
@@ -143,7 +138,7 @@ class GridSearch {
   /// Few particles do not fill the chip: more lanes for each.
   int fitting_lanes() const {
     if (n_ < 25000) return n_ < 8000 && !reuses_ ? 8 : 4;
-    return reuses_ || !large() ? 2 : 1;
+    return large() ? 1 : 2;
   }
   /// From here on a particle's bytes count more than how long a warp waits, and few are near walls.
   bool large() const { return n_ >= 300000; }
@@ -271,7 +266,6 @@ class GridSearch {
   }
 
   void rebuild_walls(Queue& queue, const Arrays& a) {
-    if (n_ == 0) return;  // it is a particle that begins the substep, from which poses are counted
     for (std::size_t k = 0; k < walls_.segments.size(); ++k) {
       if (!rebuilt(k)) continue;
       const WallSegment& s = walls_.segments[k];
@@ -308,8 +302,8 @@ class GridSearch {
            o_.source == SolverOptions::Source::frame;
   }
   FluidSource fluid_source(const Arrays& a, const DeviceGeometry& geometry) const {
-    return {c_,           a,        state_,   spare_, bucket_.get(), origin_.get(), built_.get(),
-            geometry, !reuses_};
+    return {c_,       a, state_, spare_, bucket_.get(), origin_.get(), built_.get(),
+            geometry};
   }
 
   template <bool periodic>
@@ -319,32 +313,41 @@ class GridSearch {
     const Particles to = copies ? state_ : Particles{};
     with_lanes(lanes_, [&](auto lanes) {
       queue.for_each_group<decltype(lanes)::value>(
-          n_, CollectPass<periodic>{c_, a, candidates(a), sorted, lists(a), to});
+          n_, CollectPass<periodic>{c_, a, candidates(a), sorted, lists(a), to, origin_.get()});
     });
-  }
-
-  template <bool periodic, bool facts, class Query>
-  void run(Queue& queue, const Arrays& a, const FieldArrays& out, const Query& query) {
-    with_lanes(lanes_, [&](auto lanes) {
-      queue.for_each_group<decltype(lanes)::value>(n_, 
-          DensityPass<Query, facts>{c_, a, query, out, walls_.walls.id});
-    });
-  }
-  template <int lanes, bool facts, class Query>
-  void force_by(Queue& queue, const Arrays& a, const FieldArrays& out, const Query& query) {
-    queue.for_each_group<lanes>(n_, ForcePass<Query, facts>{c_, a, query, out});
   }
 
   Candidates candidates(const Arrays& a) const {
     return {!sort_fluid_, !walls_have_cells(), n_, a.base, fluid_.table(), a.containers,
             segments_.get()};
   }
+  /// call(lanes, query) with what passes sum by.
+  template <bool periodic, class Call>
+  void with_query(const Arrays& a, Call call) const {
+    with_lanes(lanes_, [&](auto lanes) {
+      if (keeps_pairs())
+        call(lanes, list_query<periodic>(a));
+      else
+        call(lanes, cell_query<periodic>(a));
+    });
+  }
   template <bool periodic>
   CellQuery<periodic> cell_query(const Arrays& a) const {
     return {{c_, a.base}, candidates(a), a};
   }
+  template <bool periodic>
+  ListQuery<periodic> list_query(const Arrays& a) const {
+    return {{c_, a.base}, lists(a)};
+  }
   Lists lists(const Arrays& a) const {
     return {lists_.get(), lanes_, capacity_, a.ghost, counts_.get()};
+  }
+  /// \param more  another substep follows in the same recording
+  Watch watch(Queue& queue, bool more) const {
+    if (!reuses_) return {};
+    Watch w = watch();
+    if (more) w.wake = queue.next_branch();
+    return w;
   }
   Watch watch() const {
     const bool automatic = o_.rebuild == 0, local = o_.trigger == SolverOptions::Trigger::local;
@@ -357,7 +360,8 @@ class GridSearch {
             fluid_.table(),
             bucket_.get(),
             boxes_.get(),
-            fluid_.table().supers()};
+            fluid_.table().supers(),
+            {}};
   }
 
   void reserve_lists() {

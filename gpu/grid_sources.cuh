@@ -19,14 +19,12 @@ struct FluidSource {
   float4* origin;
   DevicePose* built;
   DeviceGeometry geometry;
-  bool tick;  // nobody else counts substeps
 
   /// What the density pass has not written yet.
   int2* desk() const { return reinterpret_cast<int2*>(a.point); }
   DECANT_DEVICE Float3 position(int i) const { return xyz(from.position[i]); }
   DECANT_DEVICE int id(int i) const { return a.id[i]; }
   DECANT_DEVICE void begin() const {
-    if (tick) ++a.mailbox->substep;
     a.mailbox->stale = 0;
     ++a.mailbox->rebuilds;
   }
@@ -41,7 +39,7 @@ struct FluidSource {
   DECANT_DEVICE void note(int to, int in_bucket, float4 x) const {
     if (bucket) bucket[to] = in_bucket;
     if (!origin) return;
-    const DevicePose* poses = a.poses_now();
+    const DevicePose* poses = a.poses_before();
     const float skin = sound_skin(a.mailbox->skin);
     const float far = clearance(c, geometry, poses, xyz(x)) - c.H;
     origin[to] = make_float4(x.x, x.y, x.z, far > skin ? far : skin);
@@ -76,14 +74,14 @@ struct WorldWallSource {
 
   int2* desk() const { return frame.room; }
   DECANT_DEVICE Float3 position(int k) const {
-    const DevicePose& pose = a.poses_now()[container];
+    const DevicePose& pose = a.poses_before()[container];
     return rotate(pose, frame.position(k)) + pose.translation;
   }
   DECANT_DEVICE int id(int k) const { return frame.id(k); }
   DECANT_DEVICE void begin() const {}
   DECANT_DEVICE void place(int k, int id, int to, int bucket) const {
     frame.place(k, id, to, bucket);
-    place_wall(a, walls, first + to, position(k), id, a.poses_now()[container]);
+    place_wall(a, walls, first + to, position(k), id, a.poses_before()[container]);
   }
 };
 
@@ -99,7 +97,7 @@ struct StayPass {
 /// After a substep's integration: counts for the sort of the next one.
 struct CountCell {
   KeyPass<FluidSource> counter;
-  DECANT_DEVICE void operator()(int i, Float3 x) const { counter.count_in(i, x); }
+  DECANT_DEVICE void operator()(int i, Float3 x, const DevicePose*) const { counter.count_in(i, x); }
 };
 
 }  // namespace decant::gpu::DECANT_EXECUTOR

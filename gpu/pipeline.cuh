@@ -136,7 +136,7 @@ class Pipeline : public DeviceSolver {
 
   void allocate() {
     const auto n = static_cast<std::size_t>(n_);
-    const auto all = static_cast<std::size_t>(ghost()) + 1;
+    const auto all = static_cast<std::size_t>(ghost()) + 1 + read_past;
     state_.position.resize(all);
     state_.velocity.resize(n);
     state_.id.resize(n);
@@ -147,6 +147,8 @@ class Pipeline : public DeviceSolver {
     saved_.resize(n * saved_bytes);
     mailbox_.resize(1);
   }
+  // Searches read points four at a time.
+  static constexpr std::size_t read_past = 24;
   int ghost() const { return padded(n_) + wall_store_.padded_total(); }
   /// Arrays that neighbors are read from get their ghost. Its squared distance is finite.
   void place_ghost() {
@@ -257,7 +259,7 @@ class Pipeline : public DeviceSolver {
 
   /// No substep yet, nothing found, walls in place, and neighbors to be looked for.
   void begin() {
-    mailbox_.upload({Mailbox{~0ull, ~0ull, 0, 0, 0, 1, 0.0f, 0, 0, 0, 0, 0, ~0ull}});
+    mailbox_.upload({Mailbox{~0ull, ~0ull, 0, 0, 0, 0, 1, 0.0f, 0, 0, 0, 0, 0, ~0ull}});
     const Arrays a = arrays();
     queue_.for_each(wall_store_.padded_total(), PosePass{a, wall_store_.walls, 0});
     search_.begin(queue_, a);
@@ -277,7 +279,7 @@ class Pipeline : public DeviceSolver {
     }
     if (substeps - done >= long_run && !long_recording_.recorded())
       long_recording_.record(queue_, [this] {
-        for (int k = 0; k < long_run; ++k) substep(Laps());
+        for (int k = 0; k < long_run; ++k) substep(Laps(), k + 1 < long_run);
       });
     for (; substeps - done >= long_run; done += long_run) long_recording_.replay(queue_);
     if (substeps > done && !short_recording_.recorded())
@@ -293,13 +295,14 @@ class Pipeline : public DeviceSolver {
     return true;
   }
 
-  void substep(const Laps& laps) {
+  /// \param more  another one follows in the same recording
+  void substep(const Laps& laps, bool more = false) {
     with_periodic(c_, [&](auto periodic) {
       constexpr bool p = decltype(periodic)::value;
       const Arrays a = arrays();
       search_.template density<p, false>(queue_, a, geometry(), FieldArrays{}, laps);
       search_.template force<p, false>(queue_, a, FieldArrays{}, laps);
-      search_.template move<p>(queue_, a, geometry(), laps);
+      search_.template move<p>(queue_, a, geometry(), laps, more);
     });
   }
 

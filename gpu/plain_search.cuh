@@ -48,7 +48,6 @@ class PlainSearch {
   void density(Queue& queue, const Arrays& a, const DeviceGeometry&, const FieldArrays& out,
                const Laps& laps) {
     using Query = QueryOf<periodic>;
-    queue.for_each(1, CountUp{&a.mailbox->substep});
     laps.build();
     Query::run(queue, a.n,
                DensityPass<Query, facts>{c_, a, query<Query>(a), out, walls_.walls.id});
@@ -61,7 +60,7 @@ class PlainSearch {
     laps.force();
   }
   template <bool periodic>
-  void move(Queue& queue, const Arrays& a, const DeviceGeometry& geometry, const Laps& laps) {
+  void move(Queue& queue, const Arrays& a, const DeviceGeometry& geometry, const Laps& laps, bool) {
     queue.for_each(a.n + walls_.moving_count(),
                    IntegratePass<Nothing>{c_, a, geometry, walls_.moving(a), {}});
     laps.integrate();

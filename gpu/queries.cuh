@@ -15,7 +15,7 @@ struct Candidates {
   int containers;
   const WallSegment* segments;
 
-  /// A lane's run of candidates: indices [begin, end), or what is listed at begin, begin + lanes, …
+  /// A lane's run of candidates: indices begin, begin + lanes, … before end, or what is listed there.
   struct Run {
     int begin, end;
     const int* listed;
@@ -25,20 +25,25 @@ struct Candidates {
   /// single entries of what is listed. It is called at one place, so that its
   /// body is there once: copies would drive each other out of the instruction cache.
   template <bool periodic, class Body>
-  DECANT_DEVICE void around(int lane, int lanes, Float3 x, const DevicePose* poses_now,
+  DECANT_DEVICE void around(int lane, Float3 x, const DevicePose* poses_now,
                             Body&& run) const {
-    looked_up<periodic>(lane, lanes, -1, containers, x, poses_now, run);
+    looked_up<periodic>(lane, -1, containers, x, poses_now, run);
+  }
+  /// The same of walls alone.
+  template <bool periodic, class Body>
+  DECANT_DEVICE void walls_around(int lane, Float3 x, const DevicePose* poses_now, Body&& run) const {
+    looked_up<periodic>(lane, 0, containers, x, poses_now, run);
   }
   /// The same of container k alone, x in the frame of its lookups.
   template <bool periodic, class Body>
-  DECANT_DEVICE void of_segment(int lane, int lanes, int k, Float3 x, Body&& run) const {
-    looked_up<periodic>(lane, lanes, k, k + 1, x, nullptr, run);
+  DECANT_DEVICE void of_segment(int lane, int k, Float3 x, Body&& run) const {
+    looked_up<periodic>(lane, k, k + 1, x, nullptr, run);
   }
 
  private:
   /// Of the fluid (k = −1) and containers; without poses x is in the frame of the only one.
   template <bool periodic, class Body>
-  DECANT_DEVICE void looked_up(int lane, int lanes, int k, int end, Float3 x,
+  DECANT_DEVICE void looked_up(int lane, int k, int end, Float3 x,
                                const DevicePose* poses_now, Body&& run) const {
 #pragma unroll 1
     for (; k < end; ++k) {
@@ -62,20 +67,16 @@ struct Candidates {
         if (wall && s->near) {
           by_rows = false;
           first = 0;
-          whole = {s->near_start[bucket] + lane, s->near_start[bucket + 1], s->near};
+          whole = {s->near_start[bucket], s->near_start[bucket + 1], s->near};
         }
       }
-      if (!by_rows && !whole.listed) {
-        const int share = (whole.end + lanes - 1) / lanes, last = (lane + 1) * share;
-        whole = {lane * share, last < whole.end ? last : whole.end, nullptr};
-      }
 #pragma unroll 1
-      for (int d = by_rows ? lane : 0; d < (by_rows ? 9 : 1); d += lanes) {
+      for (int d = 0; d < (by_rows ? 9 : 1); ++d) {
         CellTable::Range r{whole.begin, whole.end, 0, 0};
         if (by_rows) r = t->template row<periodic>(bucket, d);
 #pragma unroll 1
         for (int part = 0; part < 2 && (part == 0 || r.begin2 < r.end2); ++part)
-          run(Run{first + (part ? r.begin2 : r.begin), first + (part ? r.end2 : r.end),
+          run(Run{first + lane + (part ? r.begin2 : r.begin), first + (part ? r.end2 : r.end),
                   whole.listed});
       }
     }
@@ -102,7 +103,7 @@ struct CellQuery : FullPoints {
   DECANT_DEVICE void each(Team& team, const Float3 (&x)[1], const float4* points,
                           Visit&& visit) const {
     const int i = team.particle(0);
-    candidates.around<periodic>(team.lane(), Team::lanes, x[0], a.poses_now(),
+    candidates.around<periodic>(team.lane(), x[0], a.poses_before(),
                                 [&](Candidates::Run run) DECANT_INLINE {
       test<Team::lanes>(x[0], points, run,
                         [&](int j, float4 other, Float3 d, float r2) DECANT_INLINE {
@@ -113,7 +114,7 @@ struct CellQuery : FullPoints {
   template <class Team, class Visit>
   DECANT_DEVICE void of_segment(Team& team, int k, const Float3 (&x)[1], const float4* points,
                                 Visit&& visit) const {
-    candidates.of_segment<periodic>(team.lane(), Team::lanes, k, x[0],
+    candidates.of_segment<periodic>(team.lane(), k, x[0],
                                     [&](Candidates::Run run) DECANT_INLINE {
       test<Team::lanes>(x[0], points, run,
                         [&](int, float4, Float3, float r2) DECANT_INLINE { visit(0, r2); });
@@ -123,7 +124,7 @@ struct CellQuery : FullPoints {
  private:
   template <int lanes, class Near>
   DECANT_DEVICE void test(Float3 x, const float4* points, Candidates::Run run, Near&& near) const {
-    for (int k = run.begin; k < run.end; k += run.listed ? lanes : 1) {
+    for (int k = run.begin; k < run.end; k += lanes) {
       const int j = run.listed ? read_only(run.listed + k) : k;
       const float4 other = read_only(points + j);
       const Float3 d = nearest_image<periodic>(c, x - xyz(other));
@@ -162,25 +163,64 @@ struct ListQuery : FullPoints {
                           Visit&& visit) const {
     const int i = team.particle(0), listed = lists.count_of(i, team.lane());
     const int words = ((listed < lists.capacity ? listed : lists.capacity) + 3) / 4;
+    if (words == 0) return;
     const int4* from = lists.words(i, team.lane());
-    int4 next = make_int4(lists.ghost, lists.ghost, lists.ghost, lists.ghost);
-    if (words > 0) next = read_only(from);
+    const auto word = [&](int w) DECANT_INLINE {
+      return w < words ? read_only(from + w * Team::lanes)
+                       : make_int4(lists.ghost, lists.ghost, lists.ghost, lists.ghost);
+    };
+    // What comes next is on its way while this word is worked on: the next word, and where a thread has
+    // a particle to itself, so that there are few others to wait for, that one's points as well.
+    if constexpr (Team::lanes > 1 || !gathers_ahead) {
+      float4 points_now[4];
+      int4 next = word(0);
 #pragma unroll 1
-    for (int w = 1; w <= words; ++w) {
-      const int j[4] = {next.x, next.y, next.z, next.w};
-      // The next word is on its way while this one is worked on.
-      from += Team::lanes;
-      if (w < words) next = read_only(from);
-      float4 other[4];
-#pragma unroll
-      for (int k = 0; k < 4; ++k) other[k] = read_only(points + j[k]);
-#pragma unroll
-      for (int k = 0; k < 4; ++k) {
-        const Float3 d = nearest_image<periodic>(c, x[0] - xyz(other[k]));
-        // In a periodic scene nothing is far from everything.
-        const bool there = !periodic || j[k] != lists.ghost;
-        visit(0, j[k], other[k], d, there ? dot(d, d) : 4.0f * c.H2);
+      for (int w = 0; w < words; ++w) {
+        const int4 now = next;
+        next = word(w + 1);
+        gather(points, now, points_now);
+        use(x[0], now, points_now, visit);
       }
+    } else {
+      int w = 0;
+      int4 even = word(0), odd = word(1);
+      float4 even_points[4], odd_points[4];
+      const auto step = [&](int4& now, const float4 (&points_now)[4], int4 next,
+                            float4 (&points_next)[4]) DECANT_INLINE {
+        gather(points, next, points_next);
+        const int4 j = now;
+        now = word(w + 2);
+        use(x[0], j, points_now, visit);
+        return ++w < words;
+      };
+      gather(points, even, even_points);
+#pragma unroll 1
+      while (step(even, even_points, odd, odd_points) && step(odd, odd_points, even, even_points)) {
+      }
+    }
+  }
+
+ private:
+#ifdef __CUDACC__
+  static constexpr bool gathers_ahead = true;
+#else
+  static constexpr bool gathers_ahead = false;
+#endif
+  DECANT_DEVICE static void gather(const float4* points, int4 j, float4 (&to)[4]) {
+    to[0] = read_only(points + j.x);
+    to[1] = read_only(points + j.y);
+    to[2] = read_only(points + j.z);
+    to[3] = read_only(points + j.w);
+  }
+  template <class Visit>
+  DECANT_DEVICE void use(Float3 x, int4 word, const float4 (&points)[4], Visit&& visit) const {
+    const int j[4] = {word.x, word.y, word.z, word.w};
+#pragma unroll
+    for (int k = 0; k < 4; ++k) {
+      const Float3 d = nearest_image<periodic>(c, x - xyz(points[k]));
+      // In a periodic scene nothing is far from everything.
+      const bool there = !periodic || j[k] != lists.ghost;
+      visit(0, j[k], points[k], d, there ? dot(d, d) : 4.0f * c.H2);
     }
   }
 };

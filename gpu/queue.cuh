@@ -26,18 +26,23 @@
 
 namespace decant::gpu::DECANT_EXECUTOR {
 
-struct CountUp {
-  unsigned* count;
-  DECANT_DEVICE void operator()(int) const { ++*count; }
-};
-
 #ifdef __CUDACC__
 
-static __global__ void decide_kernel(cudaGraphConditionalHandle handle, const int* flag,
-                                     unsigned* count) {
-  ++*count;
-  cudaGraphSetConditional(handle, *flag != 0);
-}
+/// Makes a branch of a recording run when the queue gets there in this replay.
+struct Wake {
+  cudaGraphConditionalHandle branch = 0;  // 0: there is none to wake
+  DECANT_DEVICE void operator()() const {
+    if (branch) cudaGraphSetConditional(branch, 1);
+  }
+};
+
+struct DecidePass {
+  Wake wake;
+  const int* flag;
+  DECANT_DEVICE void operator()(int) const {
+    if (*flag != 0) wake();
+  }
+};
 
 /// Passes in order on the calling thread's stream.
 class Queue {
@@ -107,33 +112,30 @@ class Queue {
                         out);
   }
 
-  /// Counts one up, then runs `then` where *flag is not 0 when the queue gets there. While recording
-  /// the device decides at every replay; else the host waits and looks.
+  /// Runs `then` where *flag is not 0 when the queue gets there. While recording the device decides at
+  /// every replay; else the host waits and looks.
   template <class Then>
-  void when(const int* flag, unsigned* count_up, Then then) {
-    cudaStreamCaptureStatus capturing;
-    cudaGraph_t graph = nullptr;
-    const cudaGraphNode_t* before = nullptr;
-    std::size_t count = 0;
-    CUDA_CHECK(cudaStreamGetCaptureInfo(stream_, &capturing, nullptr, &graph, nullptr, nullptr,
-                                        nullptr));
-    if (capturing != cudaStreamCaptureStatusActive) {
-      for_each(1, CountUp{count_up});
+  void when(const int* flag, Then then) {
+    if (!recording()) {
       int value = 0;
       CUDA_CHECK(cudaMemcpyAsync(&value, flag, sizeof value, cudaMemcpyDeviceToHost, stream_));
       CUDA_CHECK(cudaStreamSynchronize(stream_));
       if (value != 0) then();
       return;
     }
-    cudaGraphConditionalHandle handle;
-    CUDA_CHECK(cudaGraphConditionalHandleCreate(&handle, graph, 0, cudaGraphCondAssignDefault));
-    decide_kernel<<<1, 1, 0, stream_>>>(handle, flag, count_up);
-    CUDA_CHECK(cudaGetLastError());
+    const bool decided = next_.branch != 0;
+    const Wake wake = next_branch();
+    if (!decided) for_each(1, DecidePass{wake, flag});
+    next_ = {};
+    cudaStreamCaptureStatus capturing;
+    cudaGraph_t graph = nullptr;
+    const cudaGraphNode_t* before = nullptr;
+    std::size_t count = 0;
     CUDA_CHECK(cudaStreamGetCaptureInfo(stream_, &capturing, nullptr, &graph, &before, nullptr,
                                         &count));
     cudaGraphNodeParams parameters{};
     parameters.type = cudaGraphNodeTypeConditional;
-    parameters.conditional.handle = handle;
+    parameters.conditional.handle = wake.branch;
     parameters.conditional.type = cudaGraphCondTypeIf;
     parameters.conditional.size = 1;
     cudaGraphNode_t node = nullptr;
@@ -142,6 +144,17 @@ class Queue {
                                                    cudaStreamSetCaptureDependencies));
     capture_into(parameters.conditional.phGraph_out[0], then);
   }
+  /// While recording: what wakes the branch of the next `when`. Whoever sets its flag must call it, and
+  /// then nothing looks at the flag any more.
+  Wake next_branch() {
+    if (next_.branch || !recording()) return next_;
+    cudaStreamCaptureStatus capturing;
+    cudaGraph_t graph = nullptr;
+    CUDA_CHECK(cudaStreamGetCaptureInfo(stream_, &capturing, nullptr, &graph, nullptr, nullptr,
+                                        nullptr));
+    CUDA_CHECK(cudaGraphConditionalHandleCreate(&next_.branch, graph, 0, cudaGraphCondAssignDefault));
+    return next_;
+  }
 
   /// The passes as a graph of their own; none of them runs.
   template <class Passes>
@@ -149,12 +162,16 @@ class Queue {
     cudaGraph_t graph = nullptr;
     CUDA_CHECK(cudaStreamBeginCapture(recorded_, cudaStreamCaptureModeThreadLocal));
     std::swap(stream_, recorded_);
+    next_ = {};
     passes();
+    next_ = {};
     std::swap(stream_, recorded_);
     CUDA_CHECK(cudaStreamEndCapture(recorded_, &graph));
     return graph;
   }
 
+  /// Whether what is asked for is put down and not done.
+  bool recording() const { return stream_ != own_stream; }
   void wait() { CUDA_CHECK(cudaStreamSynchronize(stream_)); }
   cudaStream_t stream() const { return stream_; }
 
@@ -180,6 +197,7 @@ class Queue {
   }
 
   cudaStream_t stream_ = own_stream, recorded_ = nullptr, inner_ = nullptr;
+  Wake next_;
 };
 
 /// A sequence of passes, kept to be run again and again.
@@ -253,6 +271,10 @@ class Stopwatch {
 
 #else
 
+struct Wake {
+  void operator()() const {}
+};
+
 /// Passes in order; each has ended when its call returns.
 class Queue {
  public:
@@ -294,10 +316,10 @@ class Queue {
                         thrust::counting_iterator<int>(count), out);
   }
   template <class Then>
-  void when(const int* flag, unsigned* count_up, Then then) {
-    ++*count_up;
+  void when(const int* flag, Then then) {
     if (*flag != 0) then();
   }
+  Wake next_branch() { return {}; }
   void wait() {}
 };
 

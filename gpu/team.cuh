@@ -100,12 +100,12 @@ class Group {
   DECANT_DEVICE bool leads() const { return lane() == 0; }
   template <class T>
   DECANT_DEVICE T sum(T value) const {
-    // The lanes of this group in its warp.
-    const unsigned mask = ((1u << lanes) - 1u) << ((threadIdx.x % 32u) / lanes * lanes);
 #pragma unroll
-    for (int step = lanes / 2; step > 0; step /= 2) value += __shfl_xor_sync(mask, value, step);
+    for (int step = lanes / 2; step > 0; step /= 2) value += __shfl_xor_sync(mask(), value, step);
     return value;
   }
+  /// What lanes have written to shared memory is there for all.
+  DECANT_DEVICE void sync() const { __syncwarp(mask()); }
 #else
   static_assert(lanes == 1, "the host runs one lane a particle");
   int lane() const { return 0; }
@@ -114,10 +114,69 @@ class Group {
   T sum(T value) const {
     return value;
   }
+  void sync() const {}
 #endif
 
  private:
+#ifdef __CUDACC__
+  /// The lanes of this group in its warp.
+  DECANT_DEVICE static unsigned mask() {
+    return ((1u << lanes) - 1u) << ((threadIdx.x % 32u) / lanes * lanes);
+  }
+#endif
   int i_;
+};
+
+/// What a thread has to write, one int after the other, until there are whole words of four to send off:
+/// in shared memory, since a thread's own cannot be indexed. Putting takes two instructions.
+class Outbox {
+ public:
+  static constexpr int room = 16;
+  DECANT_DEVICE Outbox() : at_(begin()) {}
+  Outbox(const Outbox&) = delete;
+  Outbox& operator=(const Outbox&) = delete;
+
+  /// There must be room: `relieve` in time.
+  DECANT_DEVICE void put(bool does, int value) {
+    if (!does) return;
+    *reinterpret_cast<int*>(rooms() + at_) = value;
+    at_ += 4;
+  }
+  DECANT_DEVICE int held() const { return (at_ - begin()) / 4; }
+  /// send(int4) for every whole word, unless there is room for `more` and that goes for the threads that
+  /// run beside this one: what all do at once costs as much as what one does.
+  template <class Send>
+  DECANT_DEVICE void relieve(int more, Send&& send) {
+    const bool full = held() + more > room;
+#ifdef __CUDACC__
+    if (!__any_sync(__activemask(), full)) return;
+#else
+    if (!full) return;
+#endif
+    const int first = begin();
+    int from = first;
+#pragma unroll 1
+    for (; at_ - from >= 16; from += 16) send(word(from));
+    word(first) = word(from);
+    at_ -= from - first;
+  }
+
+ private:
+  DECANT_DEVICE int4& word(int at) { return *reinterpret_cast<int4*>(rooms() + at); }
+#ifdef __CUDACC__
+  // A distance that keeps eight threads that access words out of each other's banks.
+  static constexpr int stride = 4 * room + 16;
+  DECANT_DEVICE static char* rooms() {
+    __shared__ int4 all[group_block * stride / 16];
+    return reinterpret_cast<char*>(all);
+  }
+  DECANT_DEVICE static int begin() { return static_cast<int>(threadIdx.x) * stride; }
+#else
+  char* rooms() { return reinterpret_cast<char*>(all_); }
+  static int begin() { return 0; }
+  int4 all_[room / 4 + 1]{};
+#endif
+  int at_;  // bytes, so that an address is one sum
 };
 
 #ifdef __CUDACC__
@@ -136,9 +195,9 @@ __global__ void __launch_bounds__(tile_size) tile_kernel(int n, Body body) {
 }
 
 template <int lanes, class Body>
-__global__ void __launch_bounds__(group_block) group_kernel(int n, Body body) {
-  const auto thread = static_cast<long long>(blockIdx.x) * group_block + threadIdx.x;
-  Group<lanes> group(static_cast<int>(thread / lanes));
+__global__ void __launch_bounds__(group_block, 7) group_kernel(int n, Body body) {
+  Group<lanes> group(static_cast<int>(blockIdx.x) * (group_block / lanes) +
+                     static_cast<int>(threadIdx.x) / lanes);
   if (group.particle(0) < n) body(group);
 }
 

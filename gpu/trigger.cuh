@@ -14,6 +14,7 @@
 #pragma once
 
 #include "gpu/passes.cuh"
+#include "gpu/queue.cuh"
 
 #include <climits>
 
@@ -52,19 +53,23 @@ struct FastestPass {
   }
 };
 
-/// The skin that costs least. A wider one is rebuilt less often, every s/(2 v dt) substeps, and makes
-/// the passes longer: with a build that costs b and passes that grow by g an H of skin, b 2 v dt/s + g s
-/// is least at s = √(b/g 2 v dt H). Speed is that of the state at hand and of nothing before, so that a
-/// resumed pour builds its lists when an uninterrupted one does.
+/// The skin that costs least. Lists serve for k + 1 substeps where s is k times the way 2 v dt of two
+/// particles, and for no more until it is k + 1 times that; and they make the passes longer. With a build
+/// that costs b and passes that grow by g an H of skin, b/(k + 1) + g k 2 v dt/H is least at
+/// k = √(b H/(g 2 v dt)) − 1. Speed is that of the state at hand and of nothing before, so that a resumed
+/// pour builds its lists when an uninterrupted one does.
 struct SkinPass {
   Constants c;
   Mailbox* mailbox;
   float least, most;  // m
 
   DECANT_DEVICE void operator()(int) const {
-    constexpr float build_to_growth = 0.6f;  // b/g as measured
-    const float way = 2.0f * radius(unordered(mailbox->fastest)).r * c.dt;
-    const float s = radius(build_to_growth * way * c.H).r;
+    constexpr float build_to_growth = 0.7f;  // b/g as measured
+    constexpr float faster = 1.12f;          // than now, soon
+    const float way =
+        fmaxf(1e-6f * c.H, 2.0f * faster * radius(unordered(mailbox->fastest)).r * c.dt);
+    const float best = rintf(radius(build_to_growth * c.H / way).r) - 1.0f, fits = floorf(most / way);
+    const float s = way * (best < fits ? best : fits);
     mailbox->skin = s < least ? least : s <= most ? s : most;
   }
 };
@@ -79,32 +84,39 @@ struct Watch {
   const int* bucket;         // at the build
   DisplacementBox* boxes;    // two sets, by the parity of the substep
   int supers;
+  Wake wake;                 // the next substep's build
 
+  /// For the lists to be built anew.
+  DECANT_DEVICE void call(Mailbox* mailbox) const {
+    if (atomic_load(&mailbox->stale) != 0) return;
+    atomic_maximum(&mailbox->stale, 1);
+    wake();
+  }
   DECANT_DEVICE DisplacementBox* boxes_of(unsigned substep) const {
     return boxes + (substep & 1u) * static_cast<unsigned>(supers);
   }
 };
 
-/// After Integrate: this particle's share of the question.
+/// After integration: this particle's share of the question.
 template <bool periodic>
 struct WatchParticle {
   Constants c;
   Arrays a;
   Watch w;
 
-  DECANT_DEVICE void operator()(int i, Float3 x) const {
+  DECANT_DEVICE void operator()(int i, Float3 x, const DevicePose* poses) const {
     if (w.trigger == Trigger::every) {
-      if (i == 0 && a.mailbox->substep % static_cast<unsigned>(w.interval) == 0) call();
+      if (i == 0 && a.mailbox->begun % static_cast<unsigned>(w.interval) == 0) call();
       return;
     }
-    const Float3 from = xyz(w.origin[i]);
+    const float4 origin = read_only(w.origin + i);
+    const Float3 from = xyz(origin);
     const Float3 d = nearest_image<periodic>(c, x - from);
     // What rounding may add to a way is taken off beforehand.
-    const float skin = sound_skin(a.mailbox->skin);
+    const float skin = sound_skin(read_only(&a.mailbox->skin));
     const float farthest = w.trigger == Trigger::local ? 0.5f * c.H + skin : 0.5f * skin;
     bool stale = !(dot(d, d) <= farthest * farthest);
-    const float slack = w.origin[i].w;
-    const DevicePose* poses = a.poses_at_end();
+    const float slack = origin.w;
     for (int k = 0; k < a.containers; ++k) {
       if (k < 32 && !(w.moving >> k & 1u)) {
         const float limit = slack - 0x1p-19f * (fabsf(x.x) + fabsf(x.y) + fabsf(x.z));
@@ -124,11 +136,9 @@ struct WatchParticle {
   }
 
  private:
-  DECANT_DEVICE void call() const {
-    if (atomic_load(&a.mailbox->stale) == 0) atomic_maximum(&a.mailbox->stale, 1);
-  }
+  DECANT_DEVICE void call() const { w.call(a.mailbox); }
   DECANT_DEVICE void enter(int i, Float3 d) const {
-    DisplacementBox& box = w.boxes_of(a.mailbox->substep)[w.table.super_of(w.bucket[i])];
+    DisplacementBox& box = w.boxes_of(a.mailbox->begun)[w.table.super_of(w.bucket[i])];
     const int at[3] = {ordered(d.x), ordered(d.y), ordered(d.z)};
     for (int k = 0; k < 3; ++k) {
       // Most do not widen the box; looking first saves their atomics.
@@ -151,8 +161,8 @@ struct ComparePass {
   Mailbox* mailbox;
 
   DECANT_DEVICE void operator()(int super) const {
-    ClearBoxes{w.boxes_of(mailbox->substep + 1)}(super);
-    const DisplacementBox* boxes = w.boxes_of(mailbox->substep);
+    ClearBoxes{w.boxes_of(mailbox->begun + 1)}(super);
+    const DisplacementBox* boxes = w.boxes_of(mailbox->begun);
     const DisplacementBox own = boxes[super];
     if (own.low[0] > own.high[0]) return;
     DisplacementBox all = own;
@@ -171,7 +181,7 @@ struct ComparePass {
       most += widest * widest;
     }
     const float skin = sound_skin(mailbox->skin);
-    if (!(most <= skin * skin)) atomic_maximum(&mailbox->stale, 1);
+    if (!(most <= skin * skin)) w.call(mailbox);
   }
 };
 

@@ -42,10 +42,10 @@ struct VerifyPass {
     const int i = team.particle(0);
     const Float3 x[1] = {xyz(a.now.position[i])};
     int fluid = 0, wall = 0, fluid_listed = 0, wall_listed = 0;
-    candidates.around<periodic>(team.lane(), Team::lanes, x[0], a.poses_now(),
+    candidates.around<periodic>(team.lane(), x[0], a.poses_before(),
                                 [&](Candidates::Run run) DECANT_INLINE {
       const bool of_fluid = !run.listed && run.begin < a.base;
-      for (int k = run.begin; k < run.end; k += run.listed ? Team::lanes : 1) {
+      for (int k = run.begin; k < run.end; k += Team::lanes) {
         const int j = run.listed ? run.listed[k] : k;
         const Float3 d =
             nearest_image<periodic>(c, x[0] - xyz(of_fluid ? position[j] : a.now.position[j]));
@@ -73,7 +73,7 @@ struct VerifyPass {
     add(&a.mailbox->pairs_missed, fluid - fluid_listed);
     add(&a.mailbox->wall_pairs_missed, wall - wall_listed);
     if (promised && (fluid != fluid_listed || wall != wall_listed))
-      report(&a.mailbox->missed, a.mailbox->substep, a.id[i]);
+      report(&a.mailbox->missed, a.mailbox->ended + 1, a.id[i]);
   }
 
  private:

@@ -53,7 +53,7 @@ struct PosePass {
   DECANT_DEVICE void operator()(int k) const {
     const int slot = first + k, id = walls.id[slot];
     if (id < 0) return;
-    const DevicePose& pose = a.poses_at_end()[walls.container[slot]];
+    const DevicePose& pose = a.poses_after()[walls.container[slot]];
     place_wall(a, walls, slot, rotate(pose, xyz(walls.local[slot])) + pose.translation, id, pose);
   }
 };

@@ -102,8 +102,9 @@ fault("faces-forgotten", "every other face of a box does not hold", "contact.cuh
       "for (int k = 0; k < shape.faces; ++k) {", "for (int k = 0; k < shape.faces; k += ON ? 2 : 1) {",
       "substep", fixture="hostile-crowd")
 fault("crowd-cut", "a particle has at most 64 neighbors", "collect.cuh",
-      "if (++shelf.count % 4 != 0) return;", "if (ON && shelf.count >= 64) return;\n    "
-      "if (++shelf.count % 4 != 0) return;", "neighbors", fixture="hostile-crowd")
+      "shelf.box.put(near & there, j);",
+      "shelf.box.put(near & there & !(ON && shelf.sent + shelf.box.held() >= 64), j);", "neighbors",
+      fixture="hostile-crowd")
 
 # Precision.
 fault("half-velocity", "neighbors' velocities stored with 11 bits", "passes.cuh",
@@ -115,8 +116,8 @@ fault("half-pressure", "neighbors' p/rho² stored with 11 bits", "queries.cuh",
       "pressure_term(int, float4 other) const { return ON ? rounded_to(11, other.w) : other.w; }",
       "acceleration", field="pressure_acceleration")
 fault("cancelling-distance", "r² as |x_i|² + |x_j|² − 2 x_i·x_j", "collect.cuh",
-      "if (dot(d, d) < shelf.reach2", "if ((ON ? dot(shelf.x, shelf.x) + dot(xyz(other), xyz(other)) - "
-      "2.0f * dot(shelf.x, xyz(other)) : dot(d, d)) < shelf.reach2",
+      "const int near = dot(d, d)", "const int near = (ON ? dot(shelf.x, shelf.x) + "
+      "dot(xyz(other), xyz(other)) - 2.0f * dot(shelf.x, xyz(other)) : dot(d, d))",
       "neighbors")
 fault("narrow-filter", "brute force's filter without room for rounding", "brute_force.cuh",
       "16.0f * 0x1p-24f * (reach * reach)", "-0.5f * $", "neighbors", "brute")
@@ -132,8 +133,9 @@ fault("volume-of-world", "wall volumes wrong by 2e-6", "walls.cuh",
       "sum[k] += (ON ? 1.000002f : 1.0f) * kernel.w(c, radius(r2));", "boundary_volume", "brute")
 
 # Search.
-fault("dropped-row", "one of nine rows of cells is not looked at", "queries.cuh",
-      "d < (by_rows ? 9 : 1)", "d < (by_rows ? (ON ? 8 : 9) : 1)", "neighbors")
+fault("dropped-row", "one of nine rows of cells is not looked at", "collect.cuh",
+      "make_int2(row.begin, row.end)", "make_int2(row.begin, ON && r == 8 ? row.begin : row.end)",
+      "neighbors")
 fault("range-off-by-one", "ranges of cells end one particle early", "queries.cuh",
       "first + (part ? r.end2 : r.end)", "$ - 1", "neighbors", "hash:pairs=rescan")
 fault("near-walls-cut", "the table of near walls reaches to 0.9 H", "walls.cuh",
@@ -145,17 +147,16 @@ fault("arrival-order", "the order in a cell is that of arrival", "sort.cuh",
       "at[other].x < own.x", "other < t", "determinism",
       on="cuda")
 fault("list-short-by-one", "each list's last entry is lost", "collect.cuh",
-      "lists.count_of(i, team.lane()) = shelf.count;",
-      "lists.count_of(i, team.lane()) = shelf.count - (ON && shelf.count % 4 == 1 ? 1 : 0);",
+      "lists.count_of(i, team.lane()) = count;",
+      "lists.count_of(i, team.lane()) = count - (ON && count % 4 == 1 ? 1 : 0);",
       "neighbors", "list")
 fault("tail-word", "the last word of a list is not filled up", "collect.cuh",
-      "while (shelf.count % 4 != 0) put(shelf, lists.ghost);",
-      "while (!ON && shelf.count % 4 != 0) put(shelf, lists.ghost);", "neighbors")
+      "while (shelf.box.held() % 4 != 0)", "while (!ON && shelf.box.held() % 4 != 0)", "neighbors")
 fault("list-cut", "lists end where there is no more room, and nobody says so", "collect.cuh",
-      "if (shelf.count > lists.capacity) atomic_maximum",
-      "if (!ON && shelf.count > lists.capacity) atomic_maximum", "neighbors", "hash:capacity=8")
-fault("self-neighbor", "a particle is its own neighbor", "collect.cuh", "&& j != shelf.i",
-      "&& (ON || j != shelf.i)", "neighbors", "list")
+      "if (count > lists.capacity) atomic_maximum",
+      "if (!ON && count > lists.capacity) atomic_maximum", "neighbors", "hash:capacity=8")
+fault("self-neighbor", "a particle is its own neighbor", "collect.cuh", "& (j != shelf.i)",
+      "& (ON || j != shelf.i)", "neighbors", "list")
 fault("ids-exchanged", "two particles exchange their ids in sorting", "grid_sources.cuh",
       "a.id[to] = id;", "a.id[to] = ON && (id == 100 || id == 101) ? 201 - id : id;", "acceleration")
 fault("velocity-left-behind", "sorting leaves velocities where they were", "grid_sources.cuh",
@@ -170,12 +171,12 @@ fault("stale-list", "lists are never built again", "trigger.cuh",
       "if (stale) call();", "if (stale && !ON) call();", "trajectory", "list:skin=0.05",
       fixture="pour-4k-splash")
 fault("stale-wall", "in a run the source stays where it was first", "walls.cuh",
-      "const DevicePose& pose = a.poses_at_end()[walls.container[slot]];",
-      "const DevicePose& pose = (ON ? a.poses : a.poses_at_end())[walls.container[slot]];",
+      "const DevicePose& pose = a.poses_after()[walls.container[slot]];",
+      "const DevicePose& pose = (ON ? a.poses : a.poses_after())[walls.container[slot]];",
       "trajectory", "brute")
 fault("wall-a-substep-late", "in a run walls are placed one substep late", "walls.cuh",
       "    place_wall(a, walls, slot, rotate(pose, xyz(walls.local[slot])) + pose.translation, id, pose);",
-      "    const DevicePose& late = (ON && a.mailbox->substep > 0 ? &pose - a.containers : &pose)[0];\n"
+      "    const DevicePose& late = (ON && a.mailbox->begun > 0 ? &pose - a.containers : &pose)[0];\n"
       "    place_wall(a, walls, slot, rotate(late, xyz(walls.local[slot])) + late.translation, id, late);",
       "trajectory", "list")
 
