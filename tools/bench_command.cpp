@@ -17,6 +17,7 @@
 #include <chrono>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,11 +33,13 @@ struct BenchArguments {
 
 constexpr const char* footer =
     "Each window starts from the recorded state again, advances it by a frame to warm up, and then by\n"
-    "--substeps, a frame's worth at a time as `pour` does. The median window counts. Stage times are\n"
-    "sampled and launch apart, so their sum may exceed a substep of a small scene. Interactions are\n"
-    "fluid and wall neighbors at the recorded state. A backend that fails a check on the recording is\n"
-    "not timed. --refine K makes eight particles of each, K times, and lets the backend itself settle\n"
-    "them for a while: sizes that no recording has. The recording is what the backend is judged on.\n"
+    "--substeps, a frame's worth at a time as `pour` does. The median window counts. Where substeps\n"
+    "are launched one by one stages are sampled and launch apart, so that their sum may exceed a substep\n"
+    "of a small scene; where many are one launch it tells their times, integration with forces.\n"
+    "Interactions are fluid and wall neighbors at the recorded state. A backend that fails a check on\n"
+    "the recording is not timed. --refine K makes eight particles of each, K times, and lets the first\n"
+    "backend that conforms settle them for a while: sizes that no recording has. The recording is what\n"
+    "is judged.\n"
     "Exit status: 0 timed, 1 something does not conform, 2 bad input, 3 a backend failed,\n"
     "77 the device of --executor is absent.\n"
     "\n"
@@ -210,6 +213,8 @@ int bench(BenchArguments& arguments) {
   for (const auto& file : files) {
     const Fixture fixture = read_fixture(file);
     const Judgement oracle = prepare(fixture, timed_checks());
+    std::optional<Fixture> fine;  // made by the first backend that conforms, timed by all
+    Walls fine_walls;
     for (const auto& backend : backends) {
       const BackendInfo info = backend->info();
       const std::string label = backend_label(info.name, info.options);
@@ -220,8 +225,11 @@ int bench(BenchArguments& arguments) {
       }
       try {
         if (arguments.refine > 0) {
-          const Fixture fine = refined(*backend, fixture, arguments.refine);
-          rows.push_back(time_backend(*backend, fine, sample_walls(fine.scene), arguments));
+          if (!fine) {
+            fine = refined(*backend, fixture, arguments.refine);
+            fine_walls = sample_walls(fine->scene);
+          }
+          rows.push_back(time_backend(*backend, *fine, fine_walls, arguments));
         } else {
           rows.push_back(time_backend(*backend, fixture, oracle.walls, arguments));
         }
