@@ -8,8 +8,9 @@
 
 namespace decant::gpu::DECANT_EXECUTOR {
 
-/// Particles in some order. Position: x, y, z, |x|²; velocity: x, y, z, 0. After the fluid, from
-/// Arrays::base on, wall particles: x, y, z, V_b (brute force: |x|²).
+/// Particles in some order. Position: x, y, z and the mass m, of wall particles ρ0 V_b (brute force: |x|²);
+/// velocity: x, y, z and a distance that all containers' solids keep at least (m; 0: nothing is known).
+/// Wall particles come after the fluid, from Arrays::base on.
 struct Particles {
   float4 *position, *velocity;
 };
@@ -23,11 +24,18 @@ struct Mailbox {
   int rebuilds;
   int stale;                               // neighbors must be looked for anew
   float skin;                              // of the lists of this advance, m
+  float ahead;                             // how long before its lists' middle a list is made, s
   int fastest;                             // |v|² of the fastest particle, float bits
+  float wall_step, wall_way;               // how far any wall moves in this substep, and since lists were
+                                           // made, at most, m
+  long long stage_ns[3];                   // build, density, force and integration, of a crew's substeps
   // Of lists that verify themselves, summed over substeps.
   long long pairs, pairs_missed, wall_pairs, wall_pairs_missed;
   unsigned long long missed;               // (substep << 32) | smallest id, where none may be; all ones: none
 };
+
+// Searches read points several at a time, this far beyond the last.
+inline constexpr std::size_t read_past = 24;
 
 struct Arrays {
   int n;             // fluid particles
@@ -39,6 +47,7 @@ struct Arrays {
   float4 *point, *motion;  // x, y, z, p/rho² and v, 1/rho: what neighbors read in the force pass;
                            // of wall particles x, y, z, 0 and v, V_b
   float4* acceleration;    // may lie over `now.position`, which only the density pass reads
+  bool square;  // positions carry |x|²
   Mailbox* mailbox;
   const DevicePose* poses;  // containers × (substeps + 1), substep major
   int containers;

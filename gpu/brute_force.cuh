@@ -78,7 +78,7 @@ struct BruteQuery {
           const int k = put_off[waiting - 1] % Team::held, from = put_off[waiting - 1] / Team::held;
 #pragma unroll 1
           for (int j = from; j < from + batch * tile_lanes && j < end; j += tile_lanes) {
-            const Float3 d = nearest_image<periodic>(c, x[k] - xyz(read_only(all + j)));
+            const Float3 d = nearest_image<periodic>(c, x[k] - xyz(all[j]));
             const float r2 = dot(d, d);
             if (r2 < c.H2) visit(k, j, d, r2);
           }

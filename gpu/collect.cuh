@@ -10,9 +10,12 @@ namespace decant::gpu::DECANT_EXECUTOR {
 template <class Team>
 class RunTable {
  public:
+  static constexpr int bytes = CellTable::rows * static_cast<int>(sizeof(int2));
+
+  /// On the desk, behind the outboxes.
   DECANT_DEVICE int2& run(int r) {
 #ifdef __CUDACC__
-    __shared__ int2 all[group_block / Team::lanes * CellTable::rows];
+    int2* all = reinterpret_cast<int2*>(desk() + static_cast<int>(blockDim.x) * Outbox::stride);
     return all[static_cast<int>(threadIdx.x) / Team::lanes * CellTable::rows + r];
 #else
     return all_[r];
@@ -35,20 +38,28 @@ struct CollectPass {
   Arrays a;
   Candidates candidates;
   Particles sorted;  // the fluid; wall particles are in a.now
+  const float4* points;  // where lists have the fluid
   Lists lists;
   Particles copies;  // where the fluid goes as well; null: nowhere
-  const float4* origin;  // FluidSource's; null: nothing is known of walls
+
+  template <int lanes>
+  static constexpr std::size_t desk_bytes(int threads) {
+    return static_cast<std::size_t>(threads * Outbox::stride +
+                                    threads / lanes * RunTable<Group<lanes>>::bytes);
+  }
 
   template <class Team>
   DECANT_DEVICE void operator()(Team& team) const {
     const int i = team.particle(0);
-    const float4 own = sorted.position[i];
+    const Float3 x = xyz(points[i]);
     const float reach = c.H + a.mailbox->skin;
     // Without skin exactly what the passes take for a neighbor.
     const float reach2 = reach * reach > c.H2 ? reach * reach : c.H2;
-    Shelf shelf{i, xyz(own), reach2, lists.words(i, team.lane()), {}, 0};
+    Shelf shelf{i, x, reach2, lists.words(i, team.lane()), {}, 0};
     fluid(team, shelf);
-    if (!far_from_walls(i, shelf.x))
+    const float4 own = sorted.position[i], velocity = sorted.velocity[i];
+    const Float3 way = x - xyz(own);
+    if (!far_from_walls(x, velocity.w - sqrtf(dot(way, way)), reach))
       candidates.walls_around<periodic>(team.lane(), shelf.x, a.poses_before(),
                                         [&](Candidates::Run run) DECANT_INLINE {
         if (run.listed)
@@ -63,15 +74,13 @@ struct CollectPass {
     send(shelf, Outbox::room);
     if (!copies.position || !team.leads()) return;
     copies.position[i] = own;
-    copies.velocity[i] = sorted.velocity[i];
+    copies.velocity[i] = velocity;
   }
 
  private:
-  /// Whether it is more than H and the skin away from all solids, and so from their particles.
-  DECANT_DEVICE bool far_from_walls(int i, Float3 x) const {
-    if (!origin) return false;
-    const float rounding = 0x1p-19f * (fabsf(x.x) + fabsf(x.y) + fabsf(x.z));
-    return origin[i].w - rounding > 1.001f * a.mailbox->skin;
+  /// Whether it is out of reach of all solids, and so of their particles.
+  DECANT_DEVICE static bool far_from_walls(Float3 x, float clear, float reach) {
+    return clear - rounding_of(x) > 1.001f * reach;
   }
   /// A lane's list on its way; counts on where there is no more room.
   struct Shelf {
@@ -137,26 +146,43 @@ struct CollectPass {
     }
   }
   template <int step>
-  DECANT_DEVICE void load(int k, float4 (&points)[batch]) const {
+  DECANT_DEVICE void load(int k, float4 (&to)[batch]) const {
 #pragma unroll
-    for (int b = 0; b < batch; ++b) points[b] = read_only(sorted.position + k + b * step);
+    for (int b = 0; b < batch; ++b) to[b] = points[k + b * step];
   }
+  /// The same of walls: while one batch is tested, the points of the next and the numbers of the one after
+  /// it are on their way.
   template <bool listed, int step>
   DECANT_DEVICE void walls(Shelf& shelf, Candidates::Run run) const {
-#pragma unroll 1
-    for (int k = run.begin; k < run.end; k += batch * step) {
-      int j[batch];
-      float4 other[batch];
-      send(shelf, batch);
+    if (run.begin >= run.end) return;
+    const auto numbers = [&](int k, int (&j)[batch]) DECANT_INLINE {
 #pragma unroll
       for (int b = 0; b < batch; ++b) {
-        j[b] = k + b * step;
-        if constexpr (listed) j[b] = read_only(run.listed + (j[b] < run.end ? j[b] : k));
+        const int at = k + b * step < run.end ? k + b * step : run.begin;
+        j[b] = listed ? run.listed[at] : at;
       }
+    };
+    const auto places = [&](const int (&j)[batch], float4 (&to)[batch]) DECANT_INLINE {
 #pragma unroll
-      for (int b = 0; b < batch; ++b) other[b] = read_only(a.now.position + j[b]);
+      for (int b = 0; b < batch; ++b) to[b] = a.now.position[j[b]];
+    };
+    int k = run.begin, even[batch], odd[batch];
+    float4 even_points[batch], odd_points[batch];
+    const auto one = [&](int (&now)[batch], const float4 (&points_now)[batch], const int (&next)[batch],
+                         float4 (&points_next)[batch]) DECANT_INLINE {
+      places(next, points_next);
+      send(shelf, batch);
 #pragma unroll
-      for (int b = 0; b < batch; ++b) test(shelf, j[b], other[b], k + b * step < run.end);
+      for (int b = 0; b < batch; ++b) test(shelf, now[b], points_now[b], k + b * step < run.end);
+      numbers(k + 2 * batch * step, now);
+      k += batch * step;
+      return k < run.end;
+    };
+    numbers(k, even);
+    numbers(k + batch * step, odd);
+    places(even, even_points);
+#pragma unroll 1
+    while (one(even, even_points, odd, odd_points) && one(odd, odd_points, even, even_points)) {
     }
   }
   /// No short cuts: a branch costs more than what it saves.
@@ -169,7 +195,7 @@ struct CollectPass {
   DECANT_DEVICE void send(Shelf& shelf, int more) const {
     shelf.box.relieve(more, [&](int4 word) DECANT_INLINE {
       if (shelf.sent < lists.capacity) *shelf.word = word;
-      shelf.word += lists.lanes;
+      shelf.word += Lists::beside;
       shelf.sent += 4;
     });
   }

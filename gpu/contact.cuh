@@ -6,13 +6,19 @@
 
 namespace decant::gpu::DECANT_EXECUTOR {
 
-/// All containers' shapes in device memory.
+/// All containers' shapes in device memory. The first few come along with a launch, where they are at hand.
 struct DeviceGeometry {
+  static constexpr int near_shapes = 2, near_edges = 16;
   int containers;
   const Shape* shapes;
   const Edge* edges;
   const Box* boxes;
   const Face* faces;
+  Shape first_shapes[near_shapes];
+  Edge first_edges[near_edges];
+
+  DECANT_DEVICE Shape shape(int k) const { return k < near_shapes ? first_shapes[k] : shapes[k]; }
+  DECANT_DEVICE Edge edge(int k) const { return k < near_edges ? first_edges[k] : edges[k]; }
 };
 
 /// Signed distance (m, positive outside) and its gradient, container frame.
@@ -23,13 +29,13 @@ struct Clearance {
 
 DECANT_DEVICE float clamp01(float s) { return fminf(fmaxf(s, 0.0f), 1.0f); }
 
-DECANT_DEVICE Clearance revolved_clearance(const Edge* edges, int count, Float3 x) {
+DECANT_DEVICE Clearance revolved_clearance(const DeviceGeometry& g, const Shape& shape, Float3 x) {
   const Radius axis = radius(x.x * x.x + x.y * x.y);
   const float r = axis.r, z = x.z;
   float best = 3.0e38f, away_r = 0.0f, away_z = 0.0f, face_r = 0.0f, face_z = 0.0f;
   bool inside = false, at_corner = false;
-  for (int k = 0; k < count; ++k) {
-    const Edge e = edges[k];
+  for (int k = 0; k < shape.edges; ++k) {
+    const Edge e = g.edge(shape.first_edge + k);
     const float pr = r - e.r0, pz = z - e.z0;
     const float s = clamp01((pr * e.dr + pz * e.dz) * e.inverse_length2);
     const float ar = pr - s * e.dr, az = pz - s * e.dz;
@@ -117,27 +123,50 @@ DECANT_DEVICE void respond(const Constants& c, Float3 normal, float gap, const D
   v = v_wall + (approach + impulse) * normal + keep * tangential;
 }
 
-/// All containers in turn, then the floor, as they stand at the end of the substep.
-DECANT_DEVICE void collide(const Constants& c, const DeviceGeometry& g, const DevicePose* poses,
-                           Float3& x, Float3& v) {
+/// Distance of a point from the box around a solid, container frame; 0 inside.
+DECANT_DEVICE float distance_from_box(const Shape& shape, Float3 x) {
+  const Float3 off{fmaxf(fmaxf(shape.low.x - x.x, x.x - shape.high.x), 0.0f),
+                   fmaxf(fmaxf(shape.low.y - x.y, x.y - shape.high.y), 0.0f),
+                   fmaxf(fmaxf(shape.low.z - x.z, x.z - shape.high.z), 0.0f)};
+  return sqrtf(dot(off, off));
+}
+
+DECANT_DEVICE Clearance clearance_of(const DeviceGeometry& g, const Shape& shape, Float3 x) {
+  return shape.revolved ? revolved_clearance(g, shape, x) : box_clearance(g, shape, x);
+}
+
+/// All containers in turn, as they stand at the end of the substep. Returns a distance that all solids
+/// keep from x at least: 0 after a push, or where periodic axes have solids everywhere.
+DECANT_DEVICE float collide(const Constants& c, const DeviceGeometry& g, const DevicePose* poses,
+                            Float3& x, Float3& v) {
   const float reach = c.contact_distance;
+  float clear = c.any_periodic ? 0.0f : 3.0e38f;
   for (int k = 0; k < g.containers; ++k) {
-    const Shape shape = g.shapes[k];
+    const Shape shape = g.shape(k);
     for (int projection = 0; projection < 2; ++projection) {
       const Float3 local = rotate_back(poses[k], x - poses[k].translation);
-      if (local.x < shape.low.x - reach || local.x > shape.high.x + reach ||
-          local.y < shape.low.y - reach || local.y > shape.high.y + reach ||
-          local.z < shape.low.z - reach || local.z > shape.high.z + reach)
+      const float away = distance_from_box(shape, local);
+      if (away > reach) {
+        clear = lesser(clear, away);
         break;
-      const Clearance near = shape.revolved
-                                 ? revolved_clearance(g.edges + shape.first_edge, shape.edges, local)
-                                 : box_clearance(g, shape, local);
-      if (!(near.distance < reach)) break;
+      }
+      const Clearance near = clearance_of(g, shape, local);
+      if (!(near.distance < reach)) {
+        clear = lesser(clear, near.distance);
+        break;
+      }
       respond(c, rotate(poses[k], near.normal), near.distance, &poses[k], x, v);
+      clear = 0.0f;
     }
   }
-  if (c.has_floor && x.z - c.floor_height < reach)
-    respond(c, {0, 0, 1}, x.z - c.floor_height, nullptr, x, v);
+  return clear;
+}
+
+/// The floor; whether it pushed.
+DECANT_DEVICE bool collide_with_floor(const Constants& c, Float3& x, Float3& v) {
+  if (!(c.has_floor && x.z - c.floor_height < c.contact_distance)) return false;
+  respond(c, {0, 0, 1}, x.z - c.floor_height, nullptr, x, v);
+  return true;
 }
 
 /// A distance from x within which there is no solid, at least; near a solid, what its outline says.
@@ -145,22 +174,11 @@ DECANT_DEVICE float clearance(const Constants& c, const DeviceGeometry& g, const
                               Float3 x) {
   float least = 3.0e38f;
   for (int k = 0; k < g.containers; ++k) {
-    const Shape shape = g.shapes[k];
-    // A solid without end along a periodic axis is everywhere on it.
+    const Shape shape = g.shape(k);
     if (c.any_periodic) return 0.0f;
     const Float3 at = rotate_back(poses[k], x - poses[k].translation);
-    const Float3 off{fmaxf(fmaxf(shape.low.x - at.x, at.x - shape.high.x), 0.0f),
-                     fmaxf(fmaxf(shape.low.y - at.y, at.y - shape.high.y), 0.0f),
-                     fmaxf(fmaxf(shape.low.z - at.z, at.z - shape.high.z), 0.0f)};
-    const float away = sqrtf(dot(off, off));
-    if (away > 0.0f) {
-      least = fminf(least, away);
-      continue;
-    }
-    const Clearance near = shape.revolved
-                               ? revolved_clearance(g.edges + shape.first_edge, shape.edges, at)
-                               : box_clearance(g, shape, at);
-    least = fminf(least, fmaxf(near.distance, 0.0f));
+    const float away = distance_from_box(shape, at);
+    least = lesser(least, away > 0.0f ? away : fmaxf(clearance_of(g, shape, at).distance, 0.0f));
   }
   return least;
 }

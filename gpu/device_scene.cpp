@@ -8,6 +8,8 @@
 #include "reference/state.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <limits>
 #include <numbers>
 
@@ -17,6 +19,54 @@ namespace {
 Float3 to_float3(const Vec3& v) {
   return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
 }
+
+/// A box around a container's solid, in its frame.
+struct Bounds {
+  Vec3 low = Vec3::Constant(std::numeric_limits<double>::max()), high = -low;
+
+  explicit Bounds(const Container& container) {
+    if (const auto* revolved = std::get_if<RevolvedShape>(&container.shape)) {
+      for (const ProfileEdge& e : surface_edges(*revolved)) {
+        const double r = std::max(e.r0, e.r1);
+        low = low.cwiseMin(Vec3(-r, -r, std::min(e.z0, e.z1)));
+        high = high.cwiseMax(Vec3(r, r, std::max(e.z0, e.z1)));
+      }
+    } else {
+      for (const SolidBox& b : std::get<BoxShape>(container.shape).solid) {
+        low = low.cwiseMin(b.min);
+        high = high.cwiseMax(b.max);
+      }
+    }
+  }
+  Vec3 corner(int k) const {
+    return {k & 1 ? high.x() : low.x(), k & 2 ? high.y() : low.y(), k & 4 ? high.z() : low.z()};
+  }
+};
+
+/// How far a point of the box moves from one pose to the next, at most: a corner moves farthest, since
+/// displacements are affine in the place. What fp32 makes of either pose is added.
+class FarthestMove {
+ public:
+  explicit FarthestMove(const Container& container) : moves_(moves(container)), box_(container) {}
+  /// From the pose of the call before; 0 the first time.
+  double operator()(const Pose& pose) {
+    if (!moves_) return 0;
+    double square = 0, extent = 0;
+    for (int k = 0; k < 8; ++k) {
+      const Vec3 local = box_.corner(k), after = pose.to_world(local);
+      if (!first_) square = std::max(square, (after - before_[k]).squaredNorm());
+      extent = std::max({extent, after.squaredNorm(), local.squaredNorm()});
+      before_[k] = after;
+    }
+    first_ = false;
+    return square > 0 ? std::sqrt(square) + 0x1p-19 * std::sqrt(extent) : 0;
+  }
+
+ private:
+  bool moves_, first_ = true;
+  Bounds box_;
+  std::array<Vec3, 8> before_;
+};
 
 }  // namespace
 
@@ -83,7 +133,7 @@ Geometry make_geometry(const Scene& scene) {
   Geometry g;
   for (const Container& container : scene.containers) {
     Shape shape{};
-    Vec3 low = Vec3::Constant(std::numeric_limits<double>::max()), high = -low;
+    const Bounds box(container);
     shape.first_edge = static_cast<int>(g.edges.size());
     shape.first_box = static_cast<int>(g.boxes.size());
     shape.first_face = static_cast<int>(g.faces.size());
@@ -95,25 +145,19 @@ Geometry make_geometry(const Scene& scene) {
                            static_cast<float>(dr), static_cast<float>(dz),
                            static_cast<float>(e.z1), static_cast<float>(1 / (dr * dr + dz * dz)),
                            dz != 0 ? static_cast<float>(dr / dz) : 0.0f});
-        const double r = std::max(e.r0, e.r1);
-        low = low.cwiseMin(Vec3(-r, -r, std::min(e.z0, e.z1)));
-        high = high.cwiseMax(Vec3(r, r, std::max(e.z0, e.z1)));
       }
     } else {
       const auto& boxes = std::get<BoxShape>(container.shape);
-      for (const SolidBox& b : boxes.solid) {
+      for (const SolidBox& b : boxes.solid)
         g.boxes.push_back({to_float3(b.min), to_float3(b.max)});
-        low = low.cwiseMin(b.min);
-        high = high.cwiseMax(b.max);
-      }
       for (const BoxFace& f : exposed_faces(boxes))
         g.faces.push_back({to_float3(f.min), to_float3(f.max), f.axis, f.side});
     }
     shape.edges = static_cast<int>(g.edges.size()) - shape.first_edge;
     shape.boxes = static_cast<int>(g.boxes.size()) - shape.first_box;
     shape.faces = static_cast<int>(g.faces.size()) - shape.first_face;
-    shape.low = to_float3(low);
-    shape.high = to_float3(high);
+    shape.low = to_float3(box.low);
+    shape.high = to_float3(box.high);
     g.shapes.push_back(shape);
   }
   return g;
@@ -138,8 +182,10 @@ WallSamples make_wall_samples(const Scene& scene, const Walls& walls) {
 std::vector<DevicePose> make_poses(const Scene& scene, std::int64_t first, int count) {
   std::vector<DevicePose> poses;
   poses.reserve(static_cast<std::size_t>(count) * scene.containers.size());
+  std::vector<FarthestMove> move(scene.containers.begin(), scene.containers.end());
   for (int k = 0; k < count; ++k)
-    for (const Container& container : scene.containers) {
+    for (std::size_t s = 0; s < scene.containers.size(); ++s) {
+      const Container& container = scene.containers[s];
       const Pose pose = pose_at(container, scene.time_at(first + k));
       DevicePose d{};
       for (int row = 0; row < 3; ++row)
@@ -149,6 +195,7 @@ std::vector<DevicePose> make_poses(const Scene& scene, std::int64_t first, int c
       d.pivot = to_float3(pose.pivot);
       d.omega = to_float3(pose.angular_velocity);
       d.surface = to_float3(pose.surface_velocity);
+      d.step = static_cast<float>(move[s](pose));
       poses.push_back(d);
     }
   return poses;

@@ -75,6 +75,7 @@ struct Geometry {
 struct DevicePose {
   float R[9];  // row by row
   Float3 translation, pivot, omega, surface;
+  float step;  // how far any point of the solid has moved since the pose before, at most, m
 };
 
 /// Wall particles of all containers in their frames, container by container.
@@ -88,7 +89,8 @@ Constants make_constants(const Scene& scene);
 Geometry make_geometry(const Scene& scene);
 WallSamples make_wall_samples(const Scene& scene, const Walls& walls);
 
-/// Poses of all containers at `count` substeps from `first` on: count × containers, substep major.
+/// Poses of all containers at `count` substeps from `first` on: count × containers, substep major. The
+/// first step is 0.
 std::vector<DevicePose> make_poses(const Scene& scene, std::int64_t first, int count);
 
 }  // namespace gpu

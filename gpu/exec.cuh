@@ -139,15 +139,13 @@ class Buffer {
   static void fill_ones(void* p, std::size_t bytes) {
     if (bytes) CUDA_CHECK(cudaMemsetAsync(p, 0xFF, bytes, own_stream));
   }
+  /// From pageable memory, which has been read when the call returns.
   static void copy_in(void* to, const void* from, std::size_t bytes) {
-    copy(to, from, bytes, cudaMemcpyHostToDevice);
+    if (bytes) CUDA_CHECK(cudaMemcpyAsync(to, from, bytes, cudaMemcpyHostToDevice, own_stream));
   }
   static void copy_out(void* to, const void* from, std::size_t bytes) {
-    copy(to, from, bytes, cudaMemcpyDeviceToHost);
-  }
-  static void copy(void* to, const void* from, std::size_t bytes, cudaMemcpyKind kind) {
     if (bytes == 0) return;
-    CUDA_CHECK(cudaMemcpyAsync(to, from, bytes, kind, own_stream));
+    CUDA_CHECK(cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToHost, own_stream));
     CUDA_CHECK(cudaStreamSynchronize(own_stream));
   }
   void release() {
@@ -177,16 +175,6 @@ class Buffer {
   T* data_ = nullptr;
   std::size_t size_ = 0;
 };
-
-/// What nobody writes while a pass runs.
-template <class T>
-DECANT_DEVICE T read_only(const T* p) {
-#ifdef __CUDACC__
-  return __ldg(p);
-#else
-  return *p;
-#endif
-}
 
 #ifdef __CUDACC__
 

@@ -9,9 +9,10 @@
 #pragma once
 
 #include "gpu/collect.cuh"
-#include "gpu/grid_sources.cuh"
+#include "gpu/crew.cuh"
 #include "gpu/pipeline.cuh"
 #include "gpu/verify.cuh"
+#include "gpu/wall_grids.cuh"
 
 #include <algorithm>
 #include <cmath>
@@ -35,8 +36,11 @@ class GridSearch {
     lanes_ = o_.lanes ? o_.lanes : fitting_lanes();
 #endif
     sort_fluid_ = !(reuses_ && o_.build == SolverOptions::Build::all_pairs);
-    prepare_fluid(queue, positions, a.containers);
-    prepare_walls(queue, a);
+    prepare_fluid(queue, positions);
+    grids_.prepare(queue, c_, a, walls_,
+                   {walls_have_cells(), !reuses_ && o_.source == SolverOptions::Source::rebuilt,
+                    !large(), reach_},
+                   scratch_);
     if (capacity_ == 0) {
       const double ratio = !reuses_ ? 1 : 1 + (o_.skin < 0 ? usual : o_.skin);
       capacity_ = o_.capacity ? o_.capacity
@@ -60,11 +64,27 @@ class GridSearch {
       queue.for_each(n_, fluid_.counter(fluid_source(a, {}), scratch_));
     }
     if (!reuses_) return;
-    if (o_.skin < 0) queue.for_each(n_, FastestPass{a, state_.velocity});
+    const bool ahead = o_.rebuild == 0;
+    if (o_.skin < 0 || ahead) queue.for_each(n_, FastestPass{a, state_.velocity});
     const float least = o_.skin < 0 ? static_cast<float>(narrowest) * c_.H : widest_skin_;
-    queue.for_each(1, SkinPass{c_, a.mailbox, least, widest_skin_});
+    queue.for_each(1, SkinPass{c_, a.mailbox, least, widest_skin_, ahead});
   }
-  bool capturable() const { return o_.graphs && o_.sort == SolverOptions::Sort::counting; }
+  bool capturable() const {
+    return o_.launch != SolverOptions::Launch::plain && o_.sort == SolverOptions::Sort::counting;
+  }
+  /// All of an advance in one launch, where that pays and the device can. A hash, of which most is
+  /// search, is no faster so: a crew's blocks share the work less evenly than many small ones.
+  template <bool periodic>
+  bool advance(Queue& queue, const Arrays& a, const DeviceGeometry& geometry, int substeps) {
+    if (!reuses_ || o_.launch != SolverOptions::Launch::automatic || o_.verify || !sort_fluid_ ||
+        watch().trigger == Trigger::local)
+      return false;
+    bool done = false;
+    with_crew_lanes([&](auto lanes) {
+      done = repeat_substep<decltype(lanes)::value, periodic>(queue, a, geometry, substeps);
+    });
+    return done;
+  }
 
   template <bool periodic, bool facts>
   void density(Queue& queue, const Arrays& a, const DeviceGeometry& geometry,
@@ -89,7 +109,7 @@ class GridSearch {
   void force(Queue& queue, const Arrays& a, const FieldArrays& out, const Laps& laps) {
     with_query<periodic>(a, [&](auto lanes, const auto& query) {
       using Pass = ForcePass<std::decay_t<decltype(query)>, facts>;
-      queue.for_each_group<decltype(lanes)::value>(n_, Pass{c_, a, query, out});
+      queue.for_each_group<decltype(lanes)::value>(n_, Pass{c_, a, query, out, {a}});
     });
     laps.force();
     // The ids are in the order of the cells now; so must be the state, which stays as it is.
@@ -105,7 +125,7 @@ class GridSearch {
     const Watch w = watch(queue, more);
     const auto run = [&](const auto& after) {
       using Pass = IntegratePass<std::decay_t<decltype(after)>>;
-      queue.for_each(n_ + walls_.moving_count(), Pass{c_, a, geometry, walls_.moving(a), after});
+      queue.for_each(n_ + walls_.moving_count(), Pass{{c_, a, geometry, after}, walls_.moving(a)});
     };
     if (reuses_)
       run(WatchParticle<periodic>{c_, a, w});
@@ -126,12 +146,8 @@ class GridSearch {
   }
 
   std::size_t bytes() const {
-    std::size_t sum = fluid_.bytes() + scratch_.bytes() + bucket_.bytes() + lists_.bytes() +
-                      counts_.bytes() + origin_.bytes() + built_.bytes() + boxes_.bytes() + verifier_.bytes() +
-                      segments_.bytes() + wall_from_.bytes() + wall_from_id_.bytes() + wall_room_.bytes();
-    for (const auto& grid : wall_grids_) sum += grid->bytes();
-    for (const auto& near : near_) sum += near->bytes();
-    return sum;
+    return fluid_.bytes() + grids_.bytes() + scratch_.bytes() + bucket_.bytes() + lists_.bytes() +
+           counts_.bytes() + origin_.bytes() + boxes_.bytes() + verifier_.bytes();
   }
 
  private:
@@ -145,7 +161,7 @@ class GridSearch {
   bool keeps_pairs() const { return reuses_ || o_.pairs == SolverOptions::Pairs::keep; }
   bool walls_have_cells() const { return reuses_ ? sort_fluid_ : o_.grid == SolverOptions::Grid::all; }
 
-  void prepare_fluid(Queue& queue, const std::vector<float>& positions, int containers) {
+  void prepare_fluid(Queue& queue, const std::vector<float>& positions) {
     double low[3], high[3];
     bounds(positions, low, high);
     for (int a = 0; a < 3; ++a) {
@@ -159,123 +175,10 @@ class GridSearch {
     fluid_.prepare(queue, table, n_, scratch_);
     if (!reuses_) return;
     if (o_.verify) verifier_.prepare(queue, table, n_, scratch_);
-    origin_.resize(static_cast<std::size_t>(n_));
-    built_.resize(static_cast<std::size_t>(containers));
+    origin_.resize(static_cast<std::size_t>(n_) + read_past);
     if (watch().trigger != Trigger::local) return;
     bucket_.resize(static_cast<std::size_t>(n_));
     boxes_.resize(2 * static_cast<std::size_t>(table.supers()));
-  }
-
-  void prepare_walls(Queue& queue, const Arrays& a) {
-    wall_grids_.clear();
-    near_.clear();
-    const auto total = static_cast<std::size_t>(walls_.padded_total());
-    wall_from_.resize(total);
-    wall_from_id_.resize(total);
-    wall_room_.resize(total);
-    queue.copy(wall_from_.get(), walls_.walls.local, total * sizeof(float4));
-    queue.copy(wall_from_id_.get(), walls_.walls.id, total * sizeof(int));
-    for (std::size_t k = 0; k < walls_.segments.size(); ++k) {
-      WallSegment& s = walls_.segments[k];
-      const int count = s.end - s.begin;
-      const double low[3] = {s.low.x, s.low.y, s.low.z}, high[3] = {s.high.x, s.high.y, s.high.z};
-      auto& grid = *wall_grids_.emplace_back(std::make_unique<CellSort>());
-      grid.prepare(queue, make_cell_table(c_, reach_, low, high, std::max(4096.0, 4.0 * count)),
-                   count, scratch_);
-      grid.counting(queue, count, frame_source(s), scratch_);
-      s.table = grid.table();
-      if (!rebuilt(k) && !large()) find_near(queue, a, s);
-      s.in_world = false;
-      const float margin = 1.001f * reach_, far = 3.0e38f;
-      const auto out = [&](int axis, float x, float by) {
-        return c_.periodic[axis] ? (by < 0 ? -far : far) : x + by;
-      };
-      s.low = {out(0, s.low.x, -margin), out(1, s.low.y, -margin), out(2, s.low.z, -margin)};
-      s.high = {out(0, s.high.x, margin), out(1, s.high.y, margin), out(2, s.high.z, margin)};
-    }
-    segments_.upload(walls_.segments);
-    queue.for_each(walls_.padded_total(), UnposedPass{a, walls_.walls});
-    for (std::size_t k = 0; k < walls_.segments.size(); ++k)
-      with_periodic(c_, [&](auto periodic) {
-        constexpr bool p = decltype(periodic)::value;
-        const WallSegment& s = walls_.segments[k];
-        queue.for_each_group<4>(
-            s.end - s.begin, VolumePass<CellQuery<p>>{c_, a, cell_query<p>(a), walls_.walls,
-                                                      static_cast<int>(k), s.begin});
-      });
-    bool any = false;
-    for (std::size_t k = 0; k < walls_.segments.size(); ++k) {
-      if (!rebuilt(k)) continue;
-      any = true;
-      WallSegment& s = walls_.segments[k];
-      s.in_world = true;
-      s.low = {-3.0e38f, -3.0e38f, -3.0e38f};
-      s.high = {3.0e38f, 3.0e38f, 3.0e38f};
-    }
-    segments_.upload(walls_.segments);
-    queue.wait();
-    if (any) return;
-    wall_from_.resize(0);
-    wall_from_id_.resize(0);
-    wall_room_.resize(0);
-  }
-
-  void find_near(Queue& queue, const Arrays& a, WallSegment& s) {
-    const auto buckets = static_cast<std::size_t>(s.table.buckets);
-    Buffer<int> count(buckets + 1);
-    auto& start = *near_.emplace_back(std::make_unique<Buffer<int>>(buckets + 1));
-    auto& near = *near_.emplace_back(std::make_unique<Buffer<int>>());
-    with_periodic(c_, [&](auto periodic) {
-      using Pass = NearPass<decltype(periodic)::value>;
-      Pass pass{s.table, a.base + s.begin, s.begin, walls_.walls.local, {0, 0, 0}, reach_ * reach_,
-                count.get(), nullptr, nullptr};
-      const float low[3] = {s.low.x, s.low.y, s.low.z}, high[3] = {s.high.x, s.high.y, s.high.z};
-      bool side_by_side = !c_.any_periodic;
-      for (int axis = 0; axis < 3; ++axis) {
-        const double cells = (high[axis] - s.table.origin[axis]) * s.table.inverse_cell[axis];
-        pass.used[axis] = static_cast<int>(cells) + 1;
-        side_by_side = side_by_side && cells >= 0 && low[axis] >= s.table.origin[axis] &&
-                       pass.used[axis] + 2 * CellTable::beyond(axis) < s.table.wrap[axis];
-      }
-      if (!side_by_side) pass.used[0] = 0;
-      queue.fill_zero(count.get(), count.bytes());
-      queue.for_each(s.table.buckets, pass);
-      queue.exclusive_scan(count.get(), start.get(), s.table.buckets + 1, scratch_.scan);
-      queue.wait();
-      int total = 0;
-      start.download_bytes(&total, start.get() + buckets, sizeof total);
-      near.resize(static_cast<std::size_t>(total));
-      pass.count = nullptr;
-      pass.start = start.get();
-      pass.near = near.get();
-      queue.for_each(s.table.buckets, pass);
-    });
-    queue.wait();
-    s.near_start = start.get();
-    s.near = near.get();
-  }
-
-  bool rebuilt(std::size_t k) const {
-    return !reuses_ && o_.source == SolverOptions::Source::rebuilt && walls_.moves[k] &&
-           walls_have_cells();
-  }
-
-  FrameWallSource frame_source(const WallSegment& s) const {
-    return {wall_from_.get() + s.begin, wall_from_id_.get() + s.begin, walls_.walls.local + s.begin,
-            walls_.walls.id + s.begin, wall_room_.get() + s.begin};
-  }
-
-  void rebuild_walls(Queue& queue, const Arrays& a) {
-    for (std::size_t k = 0; k < walls_.segments.size(); ++k) {
-      if (!rebuilt(k)) continue;
-      const WallSegment& s = walls_.segments[k];
-      const WorldWallSource source{a, walls_.walls, frame_source(s), s.begin, static_cast<int>(k)};
-      if (o_.sort == SolverOptions::Sort::counting)
-        wall_grids_[k]->counting(queue, s.end - s.begin, source, scratch_);
-      else
-        wall_grids_[k]->thrust(queue, s.end - s.begin, source, wall_from_id_.get() + s.begin,
-                               scratch_);
-    }
   }
 
   template <bool periodic>
@@ -284,15 +187,18 @@ class GridSearch {
     if (!sort_fluid_)
       queue.for_each(n_, StayPass{source});
     else if (counts_ahead())
-      fluid_.place_counted(queue, n_, source, scratch_);
+      start(queue, fluid_.place_counted(n_, source, scratch_));
     else if (o_.sort == SolverOptions::Sort::counting)
       fluid_.counting(queue, n_, source, scratch_);
     else
       fluid_.thrust(queue, n_, source, a.id, scratch_);
     if (watch().trigger == Trigger::local)
       queue.for_each(static_cast<int>(boxes_.size()), ClearBoxes{boxes_.get()});
-    rebuild_walls(queue, a);
-    if (keeps_pairs()) collect<periodic>(queue, a);
+    grids_.rebuild(queue, a, walls_, o_.sort == SolverOptions::Sort::counting, scratch_);
+    if (keeps_pairs())
+      with_lanes(lanes_, [&](auto lanes) {
+        start(queue, collect<decltype(lanes)::value, periodic>(a));
+      });
     laps.build();
   }
 
@@ -302,24 +208,63 @@ class GridSearch {
            o_.source == SolverOptions::Source::frame;
   }
   FluidSource fluid_source(const Arrays& a, const DeviceGeometry& geometry) const {
-    return {c_,       a, state_, spare_, bucket_.get(), origin_.get(), built_.get(),
-            geometry};
+    return {c_, a, state_, spare_, bucket_.get(), origin_.get(), geometry};
   }
 
-  template <bool periodic>
-  void collect(Queue& queue, const Arrays& a) {
+  template <int lanes, bool periodic>
+  auto collect(const Arrays& a) const {
     const Particles sorted = sort_fluid_ ? spare_ : state_;
-    const bool copies = reuses_ && sort_fluid_;
-    const Particles to = copies ? state_ : Particles{};
-    with_lanes(lanes_, [&](auto lanes) {
-      queue.for_each_group<decltype(lanes)::value>(
-          n_, CollectPass<periodic>{c_, a, candidates(a), sorted, lists(a), to, origin_.get()});
-    });
+    const Particles to = reuses_ && sort_fluid_ ? state_ : Particles{};
+    return each_group<lanes>(n_,
+                             CollectPass<periodic>{c_, a, candidates(a), sorted,
+                                                   reuses_ ? origin_.get() : sorted.position,
+                                                   lists(a), to});
+  }
+
+  /// The number of lanes as a constant, of those that crews are made for.
+  template <class Call>
+  void with_crew_lanes([[maybe_unused]] Call call) const {
+#ifdef __CUDACC__
+    if (lanes_ == 4) call(std::integral_constant<int, 4>());
+    if (lanes_ == 2) call(std::integral_constant<int, 2>());
+#else
+    call(std::integral_constant<int, 1>());
+#endif
+  }
+  template <int lanes, bool periodic>
+  bool repeat_substep(Queue& queue, const Arrays& a, const DeviceGeometry& geometry, int substeps) {
+    using Query = ListQuery<periodic>;
+    using After = WatchParticle<periodic>;
+    const Query query = list_query<periodic>(a);
+    const FluidSource source = fluid_source(a, geometry);
+    const int moving = walls_.moving_count(), first = walls_.first_moving;
+    const auto density =
+        Beside<EachGroup<lanes, DensityPass<Query, false>>, Each<PlaceWallsPass<PlacedFor::force>>>{
+            {n_, {c_, a, query, {}, walls_.walls.id}}, {moving, {a, walls_.walls, first}}};
+    const auto move = Beside<EachGroup<lanes, ForcePass<Query, false, Mover<After>>>,
+                             Each<PlaceWallsPass<PlacedFor::density>>>{
+        {n_, {c_, a, query, {}, {c_, a, geometry, {c_, a, watch()}}}},
+        {moving, {a, walls_.walls, first}}};
+    const auto build = in_order(fluid_.count(n_, source, scratch_),
+                                fluid_.place_counted(n_, source, scratch_),
+                                collect<lanes, periodic>(a));
+    using Whole = Substep<std::decay_t<decltype(build)>, std::decay_t<decltype(density)>,
+                          std::decay_t<decltype(move)>>;
+    return repeat(queue, substeps,
+                  Whole{&a.mailbox->stale, build, density, move, a.mailbox->stage_ns},
+                  crew_desk<lanes, periodic>());
+  }
+  template <int lanes, bool periodic>
+  static std::size_t crew_desk() {
+#ifdef __CUDACC__
+    return desk_bytes<lanes, CollectPass<periodic>>(crew_block);
+#else
+    return 0;
+#endif
   }
 
   Candidates candidates(const Arrays& a) const {
-    return {!sort_fluid_, !walls_have_cells(), n_, a.base, fluid_.table(), a.containers,
-            segments_.get()};
+    return grids_.candidates(a, fluid_.table(), !sort_fluid_);
   }
   /// call(lanes, query) with what passes sum by.
   template <bool periodic, class Call>
@@ -333,11 +278,11 @@ class GridSearch {
   }
   template <bool periodic>
   CellQuery<periodic> cell_query(const Arrays& a) const {
-    return {{c_, a.base}, candidates(a), a};
+    return {{c_}, candidates(a), a};
   }
   template <bool periodic>
   ListQuery<periodic> list_query(const Arrays& a) const {
-    return {{c_, a.base}, lists(a)};
+    return {{c_}, lists(a)};
   }
   Lists lists(const Arrays& a) const {
     return {lists_.get(), lanes_, capacity_, a.ghost, counts_.get()};
@@ -354,9 +299,7 @@ class GridSearch {
     if (!reuses_) return {};
     return {!automatic ? Trigger::every : local && sort_fluid_ ? Trigger::local : Trigger::global,
             o_.rebuild,
-            moving_bits(),
             origin_.get(),
-            built_.get(),
             fluid_.table(),
             bucket_.get(),
             boxes_.get(),
@@ -368,16 +311,11 @@ class GridSearch {
     lists_.resize(0);  // before the larger ones take their room
     if (!keeps_pairs()) return;
     capacity_ = (capacity_ + 3) / 4 * 4;
-    lists_.resize(static_cast<std::size_t>(capacity_ / 4 * lanes_) * static_cast<std::size_t>(n_));
-    counts_.resize(static_cast<std::size_t>(lanes_) * static_cast<std::size_t>(n_));
+    const std::size_t threads = static_cast<std::size_t>(lanes_) * static_cast<std::size_t>(n_);
+    lists_.resize(Lists::room(threads, capacity_));
+    counts_.resize(threads);
   }
 
-  unsigned moving_bits() const {
-    unsigned bits = 0;
-    for (std::size_t k = 0; k < walls_.moves.size() && k < 32; ++k)
-      if (walls_.moves[k]) bits |= 1u << k;
-    return bits;
-  }
   static void bounds(const std::vector<float>& rows, double low[3], double high[3]) {
     for (std::size_t a = 0; a < 3; ++a) low[a] = high[a] = rows.empty() ? 0 : rows[a];
     for (std::size_t k = 0; k < rows.size(); ++k) {
@@ -388,7 +326,7 @@ class GridSearch {
   }
 
   // Bounds of a skin that is chosen here, and what lists are first made for; shares of H.
-  static constexpr double narrowest = 0.08, usual = 0.2, widest = 0.2;
+  static constexpr double narrowest = 0.06, usual = 0.2, widest = 0.2;
 
   SolverOptions o_;
   bool reuses_;
@@ -399,15 +337,11 @@ class GridSearch {
   WallStore walls_{};
   mutable Particles state_{}, spare_{};
   CellSort fluid_;
-  std::vector<std::unique_ptr<CellSort>> wall_grids_;
+  WallGrids grids_;
   mutable SortScratch scratch_;
-  Buffer<WallSegment> segments_;
-  Buffer<float4> wall_from_, origin_;
-  Buffer<int> bucket_, wall_from_id_, counts_;
-  Buffer<int2> wall_room_;
+  Buffer<float4> origin_;
+  Buffer<int> bucket_, counts_;
   Buffer<int4> lists_;
-  std::vector<std::unique_ptr<Buffer<int>>> near_;
-  Buffer<DevicePose> built_;
   Buffer<DisplacementBox> boxes_;
   ListVerifier verifier_;
 };

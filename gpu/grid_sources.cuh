@@ -17,33 +17,40 @@ struct FluidSource {
   // Of lists that are kept, and the bucket only for the local trigger; null otherwise.
   int* bucket;
   float4* origin;
-  DevicePose* built;
   DeviceGeometry geometry;
 
   /// What the density pass has not written yet.
   int2* desk() const { return reinterpret_cast<int2*>(a.point); }
-  DECANT_DEVICE Float3 position(int i) const { return xyz(from.position[i]); }
+  /// Of lists that are kept, where it will be halfway through their time, if that is not too far.
+  DECANT_DEVICE Float3 position(int i) const {
+    const Float3 x = xyz(from.position[i]);
+    if (!origin) return x;
+    const Float3 way = a.mailbox->ahead * xyz(from.velocity[i]);
+    const float most = 0.5f * sound_skin(a.mailbox->skin), square = dot(way, way);
+    const Float3 there =
+        x + (square > most * most ? 0.999f * most * radius(square).inverse : 1.0f) * way;
+    return dot(there - x, there - x) <= most * most ? there : x;  // rounding may have gone beyond
+  }
   DECANT_DEVICE int id(int i) const { return a.id[i]; }
   DECANT_DEVICE void begin() const {
     a.mailbox->stale = 0;
+    a.mailbox->wall_way = 0.0f;
     ++a.mailbox->rebuilds;
   }
   DECANT_DEVICE void place(int i, int id, int to, int in_bucket) const {
-    const float4 x = from.position[i];
-    into.position[to] = x;
+    into.position[to] = from.position[i];
     into.velocity[to] = from.velocity[i];
     a.id[to] = id;
-    note(to, in_bucket, x);
+    if (origin) note(to, in_bucket, position(i));
   }
   /// What there is to remember of the build.
-  DECANT_DEVICE void note(int to, int in_bucket, float4 x) const {
-    if (bucket) bucket[to] = in_bucket;
-    if (!origin) return;
-    const DevicePose* poses = a.poses_before();
-    const float skin = sound_skin(a.mailbox->skin);
-    const float far = clearance(c, geometry, poses, xyz(x)) - c.H;
-    origin[to] = make_float4(x.x, x.y, x.z, far > skin ? far : skin);
-    if (to < a.containers) built[to] = poses[to];
+  DECANT_DEVICE void note(int to, int in_bucket, Float3 x) const {
+    float way = 0.0f;
+    if (bucket) {
+      bucket[to] = in_bucket;
+      way = fmaxf(clearance(c, geometry, a.poses_before(), x) - c.H, sound_skin(a.mailbox->skin));
+    }
+    origin[to] = make_float4(x.x, x.y, x.z, way);
   }
 };
 
@@ -90,14 +97,16 @@ struct StayPass {
   FluidSource source;
   DECANT_DEVICE void operator()(int i) const {
     if (i == 0) source.begin();
-    source.note(i, 0, source.from.position[i]);
+    source.note(i, 0, source.position(i));
   }
 };
 
 /// After a substep's integration: counts for the sort of the next one.
 struct CountCell {
   KeyPass<FluidSource> counter;
-  DECANT_DEVICE void operator()(int i, Float3 x, const DevicePose*) const { counter.count_in(i, x); }
+  struct Seen {};
+  DECANT_DEVICE Seen look(int) const { return {}; }
+  DECANT_DEVICE void operator()(int i, Float3 x, Seen) const { counter.count_in(i, x); }
 };
 
 }  // namespace decant::gpu::DECANT_EXECUTOR

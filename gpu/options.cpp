@@ -56,8 +56,10 @@ const std::map<std::string, std::map<std::string, Setter>>& known_options() {
   static const auto capacity = [](O& o, const std::string& v) {
     o.capacity = number("capacity", v, 1, 4096, "must be in 1 … 4096 entries a particle");
   };
-  static const auto graphs = [](O& o, const std::string& v) {
-    o.graphs = one_of<bool>("graphs", v, {{"on", true}, {"off", false}});
+  static const auto launch = [](O& o, const std::string& v) {
+    o.launch = one_of<O::Launch>(
+        "launch", v,
+        {{"auto", O::Launch::automatic}, {"graphs", O::Launch::graphs}, {"plain", O::Launch::plain}});
   };
   static const std::map<std::string, std::map<std::string, Setter>> known = {
       {"hash",
@@ -78,7 +80,7 @@ const std::map<std::string, std::map<std::string, Setter>>& known_options() {
         {"sort", sort},
         {"lanes", lanes},
         {"capacity", capacity},
-        {"graphs", graphs}}},
+        {"launch", launch}}},
       {"list",
        {{"build",
          [](O& o, const std::string& v) {
@@ -108,7 +110,7 @@ const std::map<std::string, std::map<std::string, Setter>>& known_options() {
          }},
         {"lanes", lanes},
         {"capacity", capacity},
-        {"graphs", graphs}}},
+        {"launch", launch}}},
   };
   return known;
 }

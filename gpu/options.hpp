@@ -13,6 +13,7 @@ struct SolverOptions {
   enum class Pairs { keep, rescan };         // hash: the force pass reads a list, or cells again
   enum class Build { grid, all_pairs };      // list: from cells, or from all pairs
   enum class Trigger { local, global };      // list: what `rebuild auto` watches
+  enum class Launch { automatic, graphs, plain };
 
   Grid grid = Grid::all;
   Source source = Source::frame;
@@ -24,7 +25,7 @@ struct SolverOptions {
   double skin = -1;     // list: of H; negative: by the speed of the fastest particle
   int lanes = 0;        // threads a particle; 0: by the number of particles
   int capacity = 0;     // entries a list begins with; 0: by the skin
-  bool graphs = true;   // substeps are recorded once and replayed
+  Launch launch = Launch::automatic;  // of substeps: many at once, recorded as graphs, one by one
   bool verify = false;  // list: counts in every substep what its lists miss (verify.cuh)
 };
 

@@ -58,6 +58,14 @@ struct DensityPass {
   }
 
  private:
+  DECANT_DEVICE void begin_substep() const {
+    ++a.mailbox->begun;
+    const DevicePose* poses = a.poses_after();
+    float step = 0.0f;
+    for (int k = 0; k < a.containers && !facts; ++k) step = fmaxf(step, poses[k].step);
+    a.mailbox->wall_step = step;
+    a.mailbox->wall_way += step;
+  }
   struct Sum {
     float density;
     int fluid_count, wall_count;
@@ -75,7 +83,7 @@ struct DensityPass {
     }
     if (!team.active(k) || !team.leads()) return;
     const int i = team.particle(k);
-    if (i == 0) ++a.mailbox->begun;
+    if (i == 0) begin_substep();
     const float p = pressure_at(c, density);
     const float4 v = a.now.velocity[i];
     a.point[i] = make_float4(x.x, x.y, x.z, p / (density * density));
@@ -104,15 +112,25 @@ struct GivenPass {
   }
 };
 
-/// Acceleration, all that `advance` needs; with `facts` its parts, by id. With w_j = m and ν_j = μ m/ρ_j
+/// What becomes of accelerations: they are kept for a pass of its own.
+struct KeepAcceleration {
+  Arrays a;
+  DECANT_DEVICE void operator()(int i, Float3, Float3, Float3 acceleration) const {
+    a.acceleration[i] = make_float4(acceleration.x, acceleration.y, acceleration.z, 0.0f);
+  }
+};
+
+/// Acceleration, all that `advance` needs, for then(i, x, v, acceleration); with `facts` its parts, by id.
+/// With w_j = m and ν_j = μ m/ρ_j
 /// of fluid, w_b = ρ0 V_b and ν_b = μ_w V_b of a wall particle, both are
 /// Σ w_j (p_i/ρ_i² + p_j/ρ_j²) G x_ij + (1/ρ_i) Σ ν_j (v_j − v_i) L.
-template <class Query, bool facts>
+template <class Query, bool facts, class Then = KeepAcceleration>
 struct ForcePass {
   Constants c;
   Arrays a;
   Query query;
   FieldArrays out;
+  Then then;
 
   template <class Team>
   DECANT_DEVICE void operator()(Team& team) const {
@@ -132,7 +150,7 @@ struct ForcePass {
                  [&](int k, int j, float4 other, Float3 d, float r2) DECANT_INLINE {
         const Radius r = radius(r2);
         const float g = kernel.g(c, r);
-        const float4 moves = read_only(a.motion + j);
+        const float4 moves = a.motion[j];
         const bool wall = j >= a.base;
         const float weight = wall ? c.rest_density * moves.w : c.mass;
         const float drag = moves.w * (wall ? c.wall_viscosity : fluid_viscosity);
@@ -150,7 +168,7 @@ struct ForcePass {
       });
     });
 #pragma unroll
-    for (int k = 0; k < Team::held; ++k) finish(team, k, x[k], own[k].inverse_density, sum[k]);
+    for (int k = 0; k < Team::held; ++k) finish(team, k, x[k], own[k], sum[k]);
   }
 
  private:
@@ -163,9 +181,10 @@ struct ForcePass {
   };
 
   template <class Team>
-  DECANT_DEVICE void finish(Team& team, int k, Float3 x, float inverse_density, Sum s) const {
+  DECANT_DEVICE void finish(Team& team, int k, Float3 x, Own own, Sum s) const {
     const int i = team.particle(k);
     const bool writes = team.active(k) && team.leads();
+    const float inverse_density = own.inverse_density;
     s.viscous = inverse_density * s.viscous;
     if constexpr (facts) {
       s.pressure = total(team, s.pressure);
@@ -185,7 +204,7 @@ struct ForcePass {
       tell(out.acceleration, id, sum);
     } else {
       const Float3 sum = total(team, s.pressure + s.viscous) + c.gravity;
-      if (writes) a.acceleration[i] = make_float4(sum.x, sum.y, sum.z, 0.0f);
+      if (writes) then(i, x, own.v, sum);
     }
   }
   DECANT_DEVICE static void tell(float* to, int id, Float3 v) {
@@ -201,37 +220,42 @@ struct ForcePass {
 };
 
 struct Nothing {
-  DECANT_DEVICE void operator()(int, Float3, const DevicePose*) const {}
+  struct Seen {};
+  DECANT_DEVICE Seen look(int) const { return {}; }
+  DECANT_DEVICE void operator()(int, Float3, Seen) const {}
 };
 
-/// Semi-implicit Euler, periodic wrap, contact at the end of the substep, checks. `after`(i, x, poses)
-/// sees the new position and the poses at the end. A pass of its own: contact wants one thread a particle where forces want several.
-/// (As one with the force pass it took longer at 56,000 particles.)
-/// Threads after the particles' place moving walls at the end of the substep.
+/// Semi-implicit Euler, periodic wrap, contact at the end of the substep, checks. after(i, x, seen) sees
+/// the new position, and what after.look(i) has fetched together with what is read here. Contact is left
+/// out where a particle and the walls have not moved enough since its distance from them was last seen
+/// for a touch.
 template <class After>
-struct IntegratePass {
+struct Mover {
   Constants c;
   Arrays a;
   DeviceGeometry geometry;
-  PosePass moving;
   After after;
 
-  DECANT_DEVICE void operator()(int i) const {
-    if (i >= a.n) return moving(i - a.n);
+  DECANT_DEVICE void operator()(int i, Float3 x, Float3 v, Float3 acceleration) const {
+    const auto seen = after.look(i);
+    const float was_clear = a.now.velocity[i].w, wall_step = a.mailbox->wall_step;
     if (i == 0) ++a.mailbox->ended;
-    Float3 x = xyz(a.point[i]), v = xyz(a.motion[i]);
-    v = v + c.dt * xyz(a.acceleration[i]);
-    x = x + c.dt * v;
+    v = v + c.dt * acceleration;
+    const Float3 way = c.dt * v;
+    x = x + way;
     x = {wrap(0, x.x), wrap(1, x.y), wrap(2, x.z)};
-    const DevicePose* poses = a.poses_after();
-    collide(c, geometry, poses, x, v);
+    const float rounding = rounding_of(x);
+    float clear = was_clear - (1.001f * (sqrtf(dot(way, way)) + wall_step) + rounding);
+    if (!(clear > 1.001f * c.contact_distance + rounding))
+      clear = collide(c, geometry, a.poses_after(), x, v);
+    if (collide_with_floor(c, x, v)) clear = 0.0f;
     if (!is_finite(x) || !is_finite(v))
       report(&a.mailbox->non_finite, a.mailbox->begun, a.id[i]);
     else if (escaped(0, x.x) || escaped(1, x.y) || escaped(2, x.z))
       report(&a.mailbox->escaped, a.mailbox->begun, a.id[i]);
-    a.next.position[i] = point_at(x);
-    a.next.velocity[i] = make_float4(v.x, v.y, v.z, 0.0f);
-    after(i, x, poses);
+    a.next.position[i] = a.square ? point_at(x) : make_float4(x.x, x.y, x.z, c.mass);
+    a.next.velocity[i] = make_float4(v.x, v.y, v.z, clear);
+    after(i, x, seen);
   }
 
  private:
@@ -241,6 +265,20 @@ struct IntegratePass {
   }
   DECANT_DEVICE bool escaped(int axis, float x) const {
     return !c.periodic[axis] && !(x >= c.domain_min[axis] && x <= c.domain_max[axis]);
+  }
+};
+
+/// Moves particles by the accelerations that were kept; threads after the particles' place moving walls at
+/// the end of the substep.
+template <class After>
+struct IntegratePass {
+  Mover<After> move;
+  PosePass moving;
+
+  DECANT_DEVICE void operator()(int i) const {
+    const Arrays& a = move.a;
+    if (i >= a.n) return moving(i - a.n);
+    move(i, xyz(a.point[i]), xyz(a.motion[i]), xyz(a.acceleration[i]));
   }
 };
 

@@ -123,6 +123,11 @@ DECANT_DEVICE float pressure_at(const Constants& c, float density) {
   return c.allow_tension || !(p < 0.0f) ? p : 0.0f;
 }
 
+/// What fp32 may be off a distance that is computed at x.
+DECANT_DEVICE float rounding_of(Float3 x) {
+  return 0x1p-19f * (fabsf(x.x) + fabsf(x.y) + fabsf(x.z));
+}
+
 /// d by the nearest image; `periodic` is known at compile time so that free scenes pay nothing.
 template <bool periodic>
 DECANT_DEVICE Float3 nearest_image(const Constants& c, Float3 d) {

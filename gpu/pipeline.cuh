@@ -8,6 +8,7 @@
 #pragma once
 
 #include "gpu/device_solver.hpp"
+#include "gpu/field_desk.cuh"
 #include "gpu/search.cuh"
 #include "reference/error.hpp"
 
@@ -33,9 +34,15 @@ class Pipeline : public DeviceSolver {
     edges_.upload(problem.geometry.edges);
     boxes_.upload(problem.geometry.boxes);
     faces_.upload(problem.geometry.faces);
+    geometry_ = {containers_, shapes_.get(), edges_.get(), boxes_.get(), faces_.get(), {}, {}};
+    const auto come_along = [](const auto& all, auto& first) {
+      for (std::size_t k = 0; k < std::min(all.size(), std::size(first)); ++k) first[k] = all[k];
+    };
+    come_along(problem.geometry.shapes, geometry_.first_shapes);
+    come_along(problem.geometry.edges, geometry_.first_edges);
     load_walls(problem.walls);
     allocate();
-    state_.upload(problem.position, problem.velocity);
+    state_.upload(problem.position, problem.velocity, c_.mass);
     place_ghost();
     times_ = {};
     rebuilds_ = advances_ = 0;
@@ -54,7 +61,7 @@ class Pipeline : public DeviceSolver {
     Mailbox mail;
     for (;;) {
       begin();
-      FieldArrays fields = unwritten_fields();
+      const FieldArrays fields = desk_.unwritten(n_);
       with_periodic(c_, [&](auto periodic) {
         constexpr bool p = decltype(periodic)::value;
         const Arrays a = arrays();
@@ -66,8 +73,8 @@ class Pipeline : public DeviceSolver {
       mail = mailbox_.download(1)[0];
       if (!grow(mail)) break;
     }
-    download_fields(out);
-    desk_.resize(0);  // room that a run does not need
+    desk_.download(out);
+    desk_.clear();  // room that a run does not need
     wall_volume_.upload(own_volume);
     out.boundary_volume = std::move(own_volume);
     return status_of(mail);
@@ -88,6 +95,7 @@ class Pipeline : public DeviceSolver {
     }
     watch_.read();
     rebuilds_ += mail.rebuilds;
+    add_times(mail);
     totals_.pairs += mail.pairs;
     totals_.missed += mail.pairs_missed;
     totals_.wall_pairs += mail.wall_pairs;
@@ -121,9 +129,11 @@ class Pipeline : public DeviceSolver {
     Buffer<int> id;
 
     std::size_t bytes() const { return position.bytes() + velocity.bytes() + id.bytes(); }
-    void upload(const std::vector<float>& x, const std::vector<float>& v) {
-      upload_rows(position, x);
-      upload_rows(velocity, v);
+    void upload(const std::vector<float>& x, const std::vector<float>& v, float mass) {
+      upload_rows(position, x, [mass](float square) {
+        return Search::points_carry_square ? square : mass;
+      });
+      upload_rows(velocity, v, [](float) { return 0.0f; });
       std::vector<int> ids(id.size());
       for (std::size_t i = 0; i < ids.size(); ++i) ids[i] = static_cast<int>(i);
       id.upload(ids);
@@ -147,8 +157,6 @@ class Pipeline : public DeviceSolver {
     saved_.resize(n * saved_bytes);
     mailbox_.resize(1);
   }
-  // Searches read points four at a time.
-  static constexpr std::size_t read_past = 24;
   int ghost() const { return padded(n_) + wall_store_.padded_total(); }
   /// Arrays that neighbors are read from get their ghost. Its squared distance is finite.
   void place_ghost() {
@@ -162,11 +170,13 @@ class Pipeline : public DeviceSolver {
   /// Padding is nowhere: no comparison with NaN holds, so it is nobody's neighbor.
   static constexpr float nowhere = std::numeric_limits<float>::quiet_NaN();
 
-  static void upload_rows(Buffer<float4>& to, const std::vector<float>& rows) {
+  /// With a fourth component, of |row|².
+  template <class Fourth>
+  static void upload_rows(Buffer<float4>& to, const std::vector<float>& rows, Fourth fourth) {
     std::vector<float4> points(to.size(), make_float4(nowhere, nowhere, nowhere, 0.0f));
     for (std::size_t i = 0; 3 * i + 2 < rows.size(); ++i) {
       const float x = rows[3 * i], y = rows[3 * i + 1], z = rows[3 * i + 2];
-      points[i] = make_float4(x, y, z, x * x + y * y + z * z);
+      points[i] = make_float4(x, y, z, fourth(x * x + y * y + z * z));
     }
     to.upload(points);
   }
@@ -219,12 +229,12 @@ class Pipeline : public DeviceSolver {
     }
     m_ = static_cast<int>(walls.x.size());
     wall_local_.resize(ids.size());
-    upload_rows(wall_local_, rows);
+    upload_rows(wall_local_, rows, [](float) { return 0.0f; });
     wall_id_.upload(ids);
     wall_container_.upload(containers);
     wall_volume_.resize(static_cast<std::size_t>(m_));
     wall_store_.walls = {wall_local_.get(), wall_id_.get(), wall_container_.get(),
-                         wall_volume_.get(), Search::points_carry_square};
+                         wall_volume_.get(), c_.rest_density};
   }
 
   void upload_poses(const std::vector<DevicePose>& poses) {
@@ -244,6 +254,7 @@ class Pipeline : public DeviceSolver {
     a.id = state_.id.get();
     a.point = point_.get();
     a.motion = motion_.get();
+    a.square = Search::points_carry_square;
     a.mailbox = mailbox_.get();
     a.poses = poses_.get();
     a.containers = containers_;
@@ -253,22 +264,29 @@ class Pipeline : public DeviceSolver {
     return a;
   }
 
-  DeviceGeometry geometry() const {
-    return {containers_, shapes_.get(), edges_.get(), boxes_.get(), faces_.get()};
-  }
+  const DeviceGeometry& geometry() const { return geometry_; }
 
   /// No substep yet, nothing found, walls in place, and neighbors to be looked for.
   void begin() {
-    mailbox_.upload({Mailbox{~0ull, ~0ull, 0, 0, 0, 0, 1, 0.0f, 0, 0, 0, 0, 0, ~0ull}});
+    Mailbox mail{};
+    mail.non_finite = mail.escaped = mail.missed = ~0ull;
+    mail.stale = 1;
+    mailbox_.upload({mail});
     const Arrays a = arrays();
     queue_.for_each(wall_store_.padded_total(), PosePass{a, wall_store_.walls, 0});
     search_.begin(queue_, a);
   }
 
-  /// Now and then the first substep is timed stage by stage and so is the second, which shares a list
-  /// with the first; the others are replayed. So is the first advance after a load: what is compared
-  /// with the oracle is what runs.
+  /// At once where the search can. Else now and then the first substep is timed stage by stage and so is
+  /// the second, which shares a list with the first; the others are replayed. So is the first advance
+  /// after a load: what is compared with the oracle is what runs.
   void run(int substeps) {
+    bool done_at_once = false;
+    with_periodic(c_, [&](auto periodic) {
+      done_at_once = search_.template advance<decltype(periodic)::value>(queue_, arrays(), geometry(),
+                                                                         substeps);
+    });
+    if (done_at_once) return;
     int done = 0;
     const int sample = advances_++ % 8 == 1 ? 2 : 0;
     const int timed = search_.capturable() ? std::min(substeps, sample) : substeps;
@@ -285,6 +303,19 @@ class Pipeline : public DeviceSolver {
     if (substeps > done && !short_recording_.recorded())
       short_recording_.record(queue_, [this] { substep(Laps()); });
     for (; done < substeps; ++done) short_recording_.replay(queue_);
+  }
+
+  /// Of substeps that kept their own time.
+  void add_times(const Mailbox& mail) {
+    const auto add = [&](StageTimes::Stage& stage, int k, int calls) {
+      if (mail.stage_ns[k] <= 0) return;
+      stage.seconds += 1e-9 * static_cast<double>(mail.stage_ns[k]);
+      stage.calls += calls;
+    };
+    const int substeps = static_cast<int>(mail.ended);
+    add(times_.build, 0, mail.rebuilds);
+    add(times_.density, 1, substeps);
+    add(times_.force, 2, substeps);
   }
 
   /// Whether lists were too short and have grown. Recordings know where the lists were.
@@ -306,14 +337,7 @@ class Pipeline : public DeviceSolver {
     });
   }
 
-  static constexpr std::size_t saved_bytes = 2 * 16 + 4, field_bytes = 2 * 8 + 15 * 4 + 4 * 4;
-
-  template <class T>
-  static T* cut(const Buffer<char>& from, std::size_t& at, std::size_t count) {
-    T* p = reinterpret_cast<T*>(from.get() + at);
-    at += count * sizeof(T);
-    return p;
-  }
+  static constexpr std::size_t saved_bytes = 2 * 16 + 4;
 
   /// each(part of the state, its place in saved_, bytes)
   template <class Each>
@@ -331,61 +355,12 @@ class Pipeline : public DeviceSolver {
     each_saved([&](void* to, void* from, std::size_t bytes) { queue_.copy(to, from, bytes); });
   }
 
-  FieldArrays fields() const {
-    std::size_t at = 0;
-    const auto n = static_cast<std::size_t>(n_);
-    FieldArrays f{};
-    f.fluid_id_sum = cut<long long>(desk_, at, n);
-    f.wall_id_sum = cut<long long>(desk_, at, n);
-    f.pressure_acceleration = cut<float>(desk_, at, 3 * n);
-    f.viscous_acceleration = cut<float>(desk_, at, 3 * n);
-    f.wall_pressure_acceleration = cut<float>(desk_, at, 3 * n);
-    f.wall_viscous_acceleration = cut<float>(desk_, at, 3 * n);
-    f.acceleration = cut<float>(desk_, at, 3 * n);
-    f.density = cut<float>(desk_, at, n);
-    f.pressure = cut<float>(desk_, at, n);
-    f.fluid_count = cut<int>(desk_, at, n);
-    f.wall_count = cut<int>(desk_, at, n);
-    return f;
-  }
-  /// What no pass writes after this reads as NaN or −1.
-  FieldArrays unwritten_fields() {
-    desk_.resize(static_cast<std::size_t>(n_) * field_bytes);
-    return fields();
-  }
-
   void use_given(const Arrays& a, const GivenInputs& given) {
     Buffer<float> density(static_cast<std::size_t>(n_)), pressure(static_cast<std::size_t>(n_));
     density.upload(given.density);
     pressure.upload(given.pressure);
     queue_.for_each(n_, GivenPass{a, density.get(), pressure.get()});
     queue_.wait();  // the two buffers end here
-  }
-
-  template <class T>
-  std::vector<T> from_desk(const T* at, std::size_t count) const {
-    std::vector<T> values(count);
-    desk_.download_bytes(values.data(), at, count * sizeof(T));
-    return values;
-  }
-
-  void download_fields(HostFields& out) const {
-    const auto n = static_cast<std::size_t>(n_);
-    const FieldArrays f = fields();
-    out.density = from_desk(f.density, n);
-    out.pressure = from_desk(f.pressure, n);
-    out.pressure_acceleration = from_desk(f.pressure_acceleration, 3 * n);
-    out.viscous_acceleration = from_desk(f.viscous_acceleration, 3 * n);
-    out.wall_pressure_acceleration = from_desk(f.wall_pressure_acceleration, 3 * n);
-    out.wall_viscous_acceleration = from_desk(f.wall_viscous_acceleration, 3 * n);
-    out.acceleration = from_desk(f.acceleration, 3 * n);
-    const auto wide = [](const auto& values) {
-      return std::vector<std::int64_t>(values.begin(), values.end());
-    };
-    out.fluid_count = wide(from_desk(f.fluid_count, n));
-    out.fluid_id_sum = wide(from_desk(f.fluid_id_sum, n));
-    out.wall_count = wide(from_desk(f.wall_count, n));
-    out.wall_id_sum = wide(from_desk(f.wall_id_sum, n));
   }
 
   static Status status_of(const Mailbox& mail) {
@@ -412,10 +387,12 @@ class Pipeline : public DeviceSolver {
   Buffer<Edge> edges_;
   Buffer<Box> boxes_;
   Buffer<Face> faces_;
+  DeviceGeometry geometry_{};
   Buffer<DevicePose> poses_;
   State state_;
   Buffer<float4> spare_position_, spare_velocity_, point_, motion_;
-  Buffer<char> saved_, desk_;  // the state before an advance; fields of an evaluation
+  Buffer<char> saved_;  // the state before an advance
+  FieldDesk desk_;
   Buffer<Mailbox> mailbox_;
   WallStore wall_store_{};
   Buffer<float4> wall_local_;

@@ -43,6 +43,10 @@ class PlainSearch {
   }
   void begin(Queue&, const Arrays&) {}
   bool capturable() const { return false; }
+  template <bool periodic>
+  bool advance(Queue&, const Arrays&, const DeviceGeometry&, int) {
+    return false;
+  }
 
   template <bool periodic, bool facts>
   void density(Queue& queue, const Arrays& a, const DeviceGeometry&, const FieldArrays& out,
@@ -56,13 +60,13 @@ class PlainSearch {
   template <bool periodic, bool facts>
   void force(Queue& queue, const Arrays& a, const FieldArrays& out, const Laps& laps) {
     using Query = QueryOf<periodic>;
-    Query::run(queue, a.n, ForcePass<Query, facts>{c_, a, query<Query>(a), out});
+    Query::run(queue, a.n, ForcePass<Query, facts>{c_, a, query<Query>(a), out, {a}});
     laps.force();
   }
   template <bool periodic>
   void move(Queue& queue, const Arrays& a, const DeviceGeometry& geometry, const Laps& laps, bool) {
     queue.for_each(a.n + walls_.moving_count(),
-                   IntegratePass<Nothing>{c_, a, geometry, walls_.moving(a), {}});
+                   IntegratePass<Nothing>{{c_, a, geometry, {}}, walls_.moving(a)});
     laps.integrate();
   }
   bool grow(int) { return false; }

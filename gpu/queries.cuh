@@ -86,11 +86,8 @@ struct Candidates {
 /// What points carry as their fourth component is what a pass needs of them.
 struct FullPoints {
   Constants c;
-  int base;
 
-  DECANT_DEVICE float weight(int j, float4 other) const {
-    return j < base ? c.mass : c.rest_density * other.w;
-  }
+  DECANT_DEVICE float weight(int, float4 other) const { return other.w; }
   DECANT_DEVICE float pressure_term(int, float4 other) const { return other.w; }
 };
 
@@ -125,8 +122,8 @@ struct CellQuery : FullPoints {
   template <int lanes, class Near>
   DECANT_DEVICE void test(Float3 x, const float4* points, Candidates::Run run, Near&& near) const {
     for (int k = run.begin; k < run.end; k += lanes) {
-      const int j = run.listed ? read_only(run.listed + k) : k;
-      const float4 other = read_only(points + j);
+      const int j = run.listed ? run.listed[k] : k;
+      const float4 other = points[j];
       const Float3 d = nearest_image<periodic>(c, x - xyz(other));
       const float r2 = dot(d, d);
       if (r2 < c.H2) near(j, other, d, r2);
@@ -136,17 +133,31 @@ struct CellQuery : FullPoints {
 
 /// Neighbor lists, fluid and wall alike: near a wall its particles take the place of the missing fluid,
 /// so one short capacity serves both. Each lane that works on a particle has a list of its own. Four
-/// entries are one word; the lanes' words lie side by side, so that a sector of memory is read whole.
-/// The last word is filled up with `ghost`, a point far from everything.
+/// entries are one word; words of the threads of a warp lie side by side, so that it reads whole lines of
+/// memory. The last word is filled up with `ghost`, a point far from everything.
 struct Lists {
-  int4* word;    // word w of lane l of particle i at word[(i × capacity/4 + w) × lanes + l]
+#ifdef __CUDACC__
+  static constexpr int beside = 32;
+#else
+  static constexpr int beside = 1;
+#endif
+  // Word w of thread t = i × lanes + lane is at (⌊t/beside⌋ × capacity/4 + w) × beside + t mod beside.
+  int4* word;
   int lanes;
   int capacity;  // entries a lane, a multiple of 4
   int ghost;
   int* count;    // [n × lanes]; more than capacity: the list is cut, and useless
 
+  /// Words of lists with so many entries, of so many threads.
+  static std::size_t room(std::size_t threads, int entries) {
+    const std::size_t side = beside;
+    return (threads + side - 1) / side * side * static_cast<std::size_t>(entries / 4);
+  }
+  /// The first; each next one is `beside` further on.
   DECANT_DEVICE int4* words(int i, int lane) const {
-    return word + static_cast<std::size_t>(i) * static_cast<std::size_t>(capacity / 4 * lanes) + lane;
+    const unsigned thread = static_cast<unsigned>(i * lanes + lane);
+    return word + static_cast<std::size_t>(thread / beside * static_cast<unsigned>(capacity / 4)) * beside +
+           thread % beside;
   }
   DECANT_DEVICE int& count_of(int i, int lane) const {
     return count[static_cast<std::size_t>(i) * static_cast<std::size_t>(lanes) +
@@ -166,7 +177,7 @@ struct ListQuery : FullPoints {
     if (words == 0) return;
     const int4* from = lists.words(i, team.lane());
     const auto word = [&](int w) DECANT_INLINE {
-      return w < words ? read_only(from + w * Team::lanes)
+      return w < words ? from[w * Lists::beside]
                        : make_int4(lists.ghost, lists.ghost, lists.ghost, lists.ghost);
     };
     // What comes next is on its way while this word is worked on: the next word, and where a thread has
@@ -207,10 +218,10 @@ struct ListQuery : FullPoints {
   static constexpr bool gathers_ahead = false;
 #endif
   DECANT_DEVICE static void gather(const float4* points, int4 j, float4 (&to)[4]) {
-    to[0] = read_only(points + j.x);
-    to[1] = read_only(points + j.y);
-    to[2] = read_only(points + j.z);
-    to[3] = read_only(points + j.w);
+    to[0] = points[j.x];
+    to[1] = points[j.y];
+    to[2] = points[j.z];
+    to[3] = points[j.w];
   }
   template <class Visit>
   DECANT_DEVICE void use(Float3 x, int4 word, const float4 (&points)[4], Visit&& visit) const {

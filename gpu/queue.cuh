@@ -3,6 +3,7 @@
 /// them without the host (a CUDA graph); a branch is decided on the device (a conditional node).
 #pragma once
 
+#include "gpu/steps.cuh"
 #include "gpu/team.cuh"
 
 #ifdef __CUDACC__
@@ -23,6 +24,7 @@
 #endif
 
 #include <functional>
+#include <map>
 
 namespace decant::gpu::DECANT_EXECUTOR {
 
@@ -80,8 +82,9 @@ class Queue {
   void for_each_group(int n, Body body) {
     if (n <= 0) return;
     constexpr int particles = group_block / lanes;
+    constexpr std::size_t desk = desk_bytes<lanes, Body>(group_block);
     group_kernel<lanes>
-        <<<(n + particles - 1) / particles, group_block, 0, stream_>>>(n, body);
+        <<<(n + particles - 1) / particles, group_block, desk, stream_>>>(n, body);
     CUDA_CHECK(cudaGetLastError());
   }
   void fill_zero(void* p, std::size_t bytes) {
@@ -170,6 +173,13 @@ class Queue {
     return graph;
   }
 
+  /// What `find` says of a kernel the first time, ever after.
+  template <class Find>
+  int remembered(const void* kernel, Find find) {
+    const auto known = found_.find(kernel);
+    return known != found_.end() ? known->second : found_.emplace(kernel, find()).first->second;
+  }
+
   /// Whether what is asked for is put down and not done.
   bool recording() const { return stream_ != own_stream; }
   void wait() { CUDA_CHECK(cudaStreamSynchronize(stream_)); }
@@ -197,6 +207,7 @@ class Queue {
   }
 
   cudaStream_t stream_ = own_stream, recorded_ = nullptr, inner_ = nullptr;
+  std::map<const void*, int> found_;
   Wake next_;
 };
 

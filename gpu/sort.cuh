@@ -9,11 +9,15 @@
 
 #include "gpu/cells.cuh"
 #include "gpu/queue.cuh"
+#include "gpu/steps.cuh"
 
 namespace decant::gpu::DECANT_EXECUTOR {
 
 /// Device memory that a sort needs; several sorts one after the other may share one.
 struct SortScratch {
+  // Blocks of a crew, at most: a sum over buckets is formed in as many shares.
+  static constexpr std::size_t most_blocks = 1024;
+
   Buffer<int> key, slot;
   Buffer<char> scan;
 
@@ -24,6 +28,7 @@ struct SortScratch {
       slot.resize(n);
     }
     Queue::reserve_scan(buckets + 1, scan);
+    if (scan.bytes() < sizeof(int) * most_blocks) scan.resize(sizeof(int) * most_blocks);
   }
   std::size_t bytes() const { return key.bytes() + slot.bytes() + scan.bytes(); }
 };
@@ -106,19 +111,21 @@ class CellSort {
  public:
   void prepare(Queue& queue, const CellTable& table, int n, SortScratch& scratch) {
     table_ = table;
-    start_.resize(static_cast<std::size_t>(table.buckets) + 1);
-    count_.resize(static_cast<std::size_t>(table.buckets) + 1);
+    start_.resize(static_cast<std::size_t>(table.buckets) + PrefixSum::more_room);
+    count_.resize(static_cast<std::size_t>(table.buckets) + PrefixSum::more_room);
     table_.start = start_.get();
     scratch.reserve(n, table.buckets);
     clear(queue);
   }
   const CellTable& table() const { return table_; }
+  /// Never sorts again.
+  void keep_table_alone() { count_.resize(0); }
   std::size_t bytes() const { return start_.bytes() + count_.bytes(); }
 
   template <class Source>
   void counting(Queue& queue, int n, const Source& source, SortScratch& s) {
-    queue.for_each(n, counter(source, s));
-    place_counted(queue, n, source, s);
+    start(queue, count(n, source, s));
+    start(queue, place_counted(n, source, s));
   }
 
   /// The same in parts, for whoever counts on the way: counter(…).count_in(i, x) for all, and
@@ -129,11 +136,17 @@ class CellSort {
     return {table_, source, s.key.get(), s.slot.get(), count_.get()};
   }
   template <class Source>
-  void place_counted(Queue& queue, int n, const Source& source, SortScratch& s) {
-    queue.exclusive_scan(count_.get(), start_.get(), table_.buckets + 1, s.scan);
-    queue.for_each(n, ScatterPass<Source>{source, s.key.get(), s.slot.get(), start_.get(),
-                                          count_.get(), source.desk()});
-    queue.for_each(n, PlacePass<Source>{source, s.key.get(), start_.get(), source.desk()});
+  auto count(int n, const Source& source, SortScratch& s) const {
+    return Each<KeyPass<Source>>{n, counter(source, s)};
+  }
+  template <class Source>
+  auto place_counted(int n, const Source& source, SortScratch& s) const {
+    return in_order(
+        PrefixSum{count_.get(), start_.get(), table_.buckets + 1, &s.scan,
+                  reinterpret_cast<int*>(s.scan.get())},
+        Each<ScatterPass<Source>>{n, {source, s.key.get(), s.slot.get(), start_.get(), count_.get(),
+                                      source.desk()}},
+        Each<PlacePass<Source>>{n, {source, s.key.get(), start_.get(), source.desk()}});
   }
 
   template <class Source>

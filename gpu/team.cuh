@@ -127,11 +127,22 @@ class Group {
   int i_;
 };
 
+#ifdef __CUDACC__
+/// Shared memory of a block, as much as its launch gave it.
+DECANT_DEVICE char* desk() {
+  extern __shared__ int4 decant_desk[];
+  return reinterpret_cast<char*>(decant_desk);
+}
+#endif
+
 /// What a thread has to write, one int after the other, until there are whole words of four to send off:
-/// in shared memory, since a thread's own cannot be indexed. Putting takes two instructions.
+/// in shared memory (at the beginning of the desk), since a thread's own cannot be indexed. Putting takes
+/// two instructions.
 class Outbox {
  public:
   static constexpr int room = 16;
+  // A distance that keeps eight threads that access words out of each other's banks.
+  static constexpr int stride = 4 * room + 16;
   DECANT_DEVICE Outbox() : at_(begin()) {}
   Outbox(const Outbox&) = delete;
   Outbox& operator=(const Outbox&) = delete;
@@ -164,12 +175,7 @@ class Outbox {
  private:
   DECANT_DEVICE int4& word(int at) { return *reinterpret_cast<int4*>(rooms() + at); }
 #ifdef __CUDACC__
-  // A distance that keeps eight threads that access words out of each other's banks.
-  static constexpr int stride = 4 * room + 16;
-  DECANT_DEVICE static char* rooms() {
-    __shared__ int4 all[group_block * stride / 16];
-    return reinterpret_cast<char*>(all);
-  }
+  DECANT_DEVICE static char* rooms() { return desk(); }
   DECANT_DEVICE static int begin() { return static_cast<int>(threadIdx.x) * stride; }
 #else
   char* rooms() { return reinterpret_cast<char*>(all_); }

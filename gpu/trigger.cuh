@@ -2,13 +2,19 @@
 /// When a neighbor list must be built anew so that it provably misses no pair. A list made at distance
 /// H + s (s the skin) misses none while no two particles that were farther apart have come within H.
 ///
-/// Walls, both triggers: a wall particle never moves in its frame, so particle i is safe while its own
-/// way in that frame is at most max(s, clearance − H), its distance from the solid at the build.
-/// Global: every displacement |d| <= s/2; no pair can have closed in by more than s.
+/// Nothing in that asks where the list has the particles: it is made as if they were already where their
+/// velocities will have brought them halfway through its time, as far as s/2 away. They come nearer to
+/// that place, pass it and go away from it, which takes twice as long as going away alone; displacements
+/// below are from there.
+///
+/// Global: every displacement |d| <= s/2, and no wall has moved further either; no pair can have closed in
+/// by more than s.
 /// Local: a falling stream moves fast but together, so relative motion is bounded instead. Super-cells
 /// are two cells wide, 2(H + s). Each keeps the box of its particles' displacements; for a super-cell
 /// and those around it, the largest difference of displacements that the boxes allow must not exceed s.
-/// Particles in super-cells that do not touch were 2(H + s) apart and need |d| <= (H + 2s)/2.
+/// Particles in super-cells that do not touch were 2(H + s) apart and need |d| <= (H + 2s)/2. Against
+/// walls a particle's own way and theirs together are at most max(s, clearance − H), its distance from the
+/// solids at the build.
 /// Displacements are exact in fp32 (Sterbenz: both positions are nearly equal); rounding elsewhere is
 /// covered by taking s smaller than the list has it.
 #pragma once
@@ -53,33 +59,34 @@ struct FastestPass {
   }
 };
 
-/// The skin that costs least. Lists serve for k + 1 substeps where s is k times the way 2 v dt of two
-/// particles, and for no more until it is k + 1 times that; and they make the passes longer. With a build
-/// that costs b and passes that grow by g an H of skin, b/(k + 1) + g k 2 v dt/H is least at
-/// k = √(b H/(g 2 v dt)) − 1. Speed is that of the state at hand and of nothing before, so that a resumed
-/// pour builds its lists when an uninterrupted one does.
+/// The skin that costs least, and how far ahead lists are made. Lists serve for k + 1 substeps where s is
+/// k times the way v dt of a particle, and for no more until it is k + 1 times that; and they make the
+/// passes longer. With a build that costs b and passes that grow by g an H of skin, b/(k + 1) + g k v dt/H
+/// is least at k = √(b H/(g v dt)) − 1. Where lists have particles as they are, two ways count. Speed is
+/// that of the state at hand and of nothing before, so that a resumed pour builds its lists when an
+/// uninterrupted one does.
 struct SkinPass {
   Constants c;
   Mailbox* mailbox;
   float least, most;  // m
+  bool ahead;
 
   DECANT_DEVICE void operator()(int) const {
-    constexpr float build_to_growth = 0.7f;  // b/g as measured
-    constexpr float faster = 1.12f;          // than now, soon
-    const float way =
-        fmaxf(1e-6f * c.H, 2.0f * faster * radius(unordered(mailbox->fastest)).r * c.dt);
+    constexpr float build_to_growth = 0.9f;  // b/g as measured
+    constexpr float faster = 1.12f;           // than now, soon
+    const float of_one = faster * radius(unordered(mailbox->fastest)).r * c.dt;
+    const float way = fmaxf(1e-6f * c.H, ahead ? of_one : 2.0f * of_one);
     const float best = rintf(radius(build_to_growth * c.H / way).r) - 1.0f, fits = floorf(most / way);
     const float s = way * (best < fits ? best : fits);
     mailbox->skin = s < least ? least : s <= most ? s : most;
+    mailbox->ahead = ahead ? 0.5f * mailbox->skin / way * c.dt : 0.0f;
   }
 };
 
 struct Watch {
   Trigger trigger;
   int interval;              // substeps, of Trigger::every
-  unsigned moving;           // bit k: container k moves; those from 32 on are taken to
-  const float4* origin;      // x, y, z at the build; what it may move against a wall
-  const DevicePose* built;   // poses at the build
+  const float4* origin;      // x, y, z at the build; local: what it may move against a wall
   CellTable table;
   const int* bucket;         // at the build
   DisplacementBox* boxes;    // two sets, by the parity of the substep
@@ -104,35 +111,30 @@ struct WatchParticle {
   Arrays a;
   Watch w;
 
-  DECANT_DEVICE void operator()(int i, Float3 x, const DevicePose* poses) const {
+  struct Seen {
+    float4 origin;
+    float skin, wall_way;
+  };
+  DECANT_DEVICE Seen look(int i) const {
+    // What rounding may add to a way is taken off beforehand.
+    return {w.origin[i], sound_skin(a.mailbox->skin), a.mailbox->wall_way};
+  }
+  DECANT_DEVICE void operator()(int i, Float3 x, const Seen& seen) const {
     if (w.trigger == Trigger::every) {
       if (i == 0 && a.mailbox->begun % static_cast<unsigned>(w.interval) == 0) call();
       return;
     }
-    const float4 origin = read_only(w.origin + i);
-    const Float3 from = xyz(origin);
-    const Float3 d = nearest_image<periodic>(c, x - from);
-    // What rounding may add to a way is taken off beforehand.
-    const float skin = sound_skin(read_only(&a.mailbox->skin));
-    const float farthest = w.trigger == Trigger::local ? 0.5f * c.H + skin : 0.5f * skin;
-    bool stale = !(dot(d, d) <= farthest * farthest);
-    const float slack = origin.w;
-    for (int k = 0; k < a.containers; ++k) {
-      if (k < 32 && !(w.moving >> k & 1u)) {
-        const float limit = slack - 0x1p-19f * (fabsf(x.x) + fabsf(x.y) + fabsf(x.z));
-        stale = stale || !(limit > 0.0f && dot(d, d) <= limit * limit);
-        continue;
-      }
-      const Float3 now = rotate_back(poses[k], x - poses[k].translation);
-      const Float3 then = rotate_back(w.built[k], from - w.built[k].translation);
-      const Float3 way = nearest_image<periodic>(c, now - then);
-      const float rounding = 0x1p-19f * (fabsf(x.x) + fabsf(x.y) + fabsf(x.z) + fabsf(now.x) +
-                                         fabsf(now.y) + fabsf(now.z));
-      const float limit = slack - rounding;
-      stale = stale || !(limit > 0.0f && dot(way, way) <= limit * limit);
+    const Float3 d = nearest_image<periodic>(c, x - xyz(seen.origin));
+    const float skin = seen.skin, wall_way = seen.wall_way;
+    if (w.trigger == Trigger::global) {
+      const float most = 0.5f * skin;
+      if (!(dot(d, d) <= most * most && wall_way <= most)) call();
+      return;
     }
-    if (stale) call();
-    if (w.trigger == Trigger::local) enter(i, d);
+    const float farthest = 0.5f * c.H + skin, of_walls = seen.origin.w - wall_way - rounding_of(x);
+    if (!(dot(d, d) <= farthest * farthest && of_walls > 0.0f && dot(d, d) <= of_walls * of_walls))
+      call();
+    enter(i, d);
   }
 
  private:

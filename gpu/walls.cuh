@@ -32,20 +32,33 @@ struct Walls {
   int* id;
   const int* container;
   float* volume;           // V_b by id
-  bool square;             // positions carry |x|² instead of V_b
+  float rest_density;
 };
 
+/// Where densities see a wall particle.
+DECANT_DEVICE void place_wall_for_density(const Arrays& a, const Walls& w, int slot, Float3 x, int id) {
+  a.now.position[a.base + slot] =
+      a.square ? point_at(x) : make_float4(x.x, x.y, x.z, w.rest_density * w.volume[id]);
+}
+/// Where forces see it.
+DECANT_DEVICE void place_wall_for_force(const Arrays& a, const Walls& w, int slot, Float3 x, int id,
+                                        const DevicePose& pose) {
+  const Float3 v = cross(pose.omega, x - pose.pivot) + pose.surface;
+  a.point[a.base + slot] = make_float4(x.x, x.y, x.z, 0.0f);
+  a.motion[a.base + slot] = make_float4(v.x, v.y, v.z, w.volume[id]);
+}
 DECANT_DEVICE void place_wall(const Arrays& a, const Walls& w, int slot, Float3 x, int id,
                               const DevicePose& pose) {
-  const Float3 v = cross(pose.omega, x - pose.pivot) + pose.surface;
-  const float volume = w.volume[id];
-  a.now.position[a.base + slot] = w.square ? point_at(x) : make_float4(x.x, x.y, x.z, volume);
-  a.point[a.base + slot] = make_float4(x.x, x.y, x.z, 0.0f);
-  a.motion[a.base + slot] = make_float4(v.x, v.y, v.z, volume);
+  place_wall_for_density(a, w, slot, x, id);
+  place_wall_for_force(a, w, slot, x, id, pose);
 }
 
-/// Wall particles to their place in the world at the end of the substep under way, or before the first.
-struct PosePass {
+/// Wall particles to their place in the world: for densities and forces, at the end of the substep under
+/// way or before the first; or in two halves, each beside a pass that does not read what it writes: for
+/// densities beside the forces of the substep that ends, for forces beside the densities of the next one.
+enum class PlacedFor { both, density, force };
+template <PlacedFor what>
+struct PlaceWallsPass {
   Arrays a;
   Walls walls;
   int first;
@@ -53,10 +66,14 @@ struct PosePass {
   DECANT_DEVICE void operator()(int k) const {
     const int slot = first + k, id = walls.id[slot];
     if (id < 0) return;
-    const DevicePose& pose = a.poses_after()[walls.container[slot]];
-    place_wall(a, walls, slot, rotate(pose, xyz(walls.local[slot])) + pose.translation, id, pose);
+    const DevicePose* poses = what == PlacedFor::force ? a.poses_before() : a.poses_after();
+    const DevicePose& pose = poses[walls.container[slot]];
+    const Float3 x = rotate(pose, xyz(walls.local[slot])) + pose.translation;
+    if constexpr (what != PlacedFor::force) place_wall_for_density(a, walls, slot, x, id);
+    if constexpr (what != PlacedFor::density) place_wall_for_force(a, walls, slot, x, id, pose);
   }
 };
+using PosePass = PlaceWallsPass<PlacedFor::both>;
 
 /// Wall particles where their frame has them, to find their volumes.
 struct UnposedPass {

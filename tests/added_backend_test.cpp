@@ -14,12 +14,12 @@ namespace {
 /// Looks at every particle, but measures only those that are near along x.
 template <bool periodic>
 struct SlabQuery : FullPoints {
-  int all_end;
+  int base, all_end;
   const WallSegment* segments;
 
   static constexpr bool points_carry_square = false;
   static SlabQuery of(const Constants& c, const Arrays& a, int all_end, const WallSegment* segments) {
-    return {{c, a.base}, all_end, segments};
+    return {{c}, a.base, all_end, segments};
   }
   template <class Pass>
   static void run(Queue& queue, int n, const Pass& pass) {

@@ -1,0 +1,168 @@
+/// \file
+/// Lists that are kept while particles move: made for the places where particles are going to be, they
+/// serve twice as long and still miss nothing. And what a particle's distance from the walls spares.
+#include "tests/backend_variants.hpp"
+#include "tests/falling_points.hpp"
+#include "tests/random_scene.hpp"
+
+#include "oracle/reference_backend.hpp"
+#include "reference/initial_state.hpp"
+#include "reference/sampling.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+
+namespace decant {
+namespace {
+
+class KeptList : public testing::TestWithParam<Executor> {
+ protected:
+  void SetUp() override {
+    std::string why_not;
+    if (!executor_available(GetParam(), &why_not)) GTEST_SKIP() << why_not;
+  }
+  static std::unique_ptr<Backend> make(const std::string& name) {
+    return test::make_variant(name, GetParam());
+  }
+};
+
+std::string executor_name(const testing::TestParamInfo<Executor>& info) {
+  return info.param == Executor::host ? "Host" : "Cuda";
+}
+INSTANTIATE_TEST_SUITE_P(On, KeptList, testing::Values(Executor::host, Executor::cuda), executor_name);
+
+/// Points a lattice spacing apart that fly the same way, in the open, with nothing that pulls at them.
+Fixture flight(const Vec3& velocity) {
+  Fixture f = test::random_fixture(3);
+  const double dx = f.scene.particle_spacing;
+  f.scene.containers.clear();
+  f.scene.gravity.setZero();
+  f.scene.domain = {Vec3::Constant(-1), Vec3::Constant(1), {}};
+  f.state.position.resize(3, 512);
+  for (int i = 0; i < 512; ++i)
+    f.state.position.col(i) = 3 * dx * Vec3(i % 8, i / 8 % 8, i / 64);  // nobody's neighbors
+  f.state.velocity = velocity.replicate(1, 512);
+  f.state.quantise();
+  return f;
+}
+
+std::int64_t rebuilds_of(Backend& backend, const Fixture& f, int substeps) {
+  backend.load(f.scene, sample_walls(f.scene), f.state);
+  EXPECT_TRUE(backend.advance(substeps).ok());
+  return backend.neighbor_stats().rebuilds;
+}
+
+TEST_P(KeptList, ServesUntilItsParticlesAreAsFarPastTheirPlacesAsTheyWereBefore) {
+  // A way of 0.02 H a substep and a skin of 0.2 H: away from where they are particles may go for five
+  // substeps; to places ahead and past them as far again, for nine, a twelfth being kept for speeds that
+  // grow.
+  Fixture f = flight(Vec3::Zero());
+  const double v = 0.02 * f.scene.support_radius() / f.scene.time_step();
+  f = flight(Vec3(v, 0, 0));
+  for (const char* launch : {"auto", "graphs", "plain"}) {
+    const auto list = make(std::string("list:skin=0.2:launch=") + launch);
+    EXPECT_LE(rebuilds_of(*list, f, 90), 10) << launch;
+    EXPECT_GE(rebuilds_of(*list, f, 90), 9) << launch;
+  }
+}
+
+TEST_P(KeptList, GivesTheSameHoweverSubstepsAreLaunched) {
+  const Fixture f = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-splash.h5");
+  const Walls walls = sample_walls(f.scene);
+  const auto run = [&](const std::string& launch) {
+    const auto list = make("list:launch=" + launch);
+    list->load(f.scene, walls, f.state);
+    EXPECT_TRUE(list->advance(f.scene.schedule.substeps_per_frame).ok());
+    ParticleState end;
+    list->read(end);
+    return end;
+  };
+  const ParticleState at_once = run("auto");
+  for (const char* launch : {"graphs", "plain"}) {
+    const ParticleState one_by_one = run(launch);
+    EXPECT_TRUE(at_once.position == one_by_one.position) << launch;
+    EXPECT_TRUE(at_once.velocity == one_by_one.velocity) << launch;
+  }
+}
+
+TEST_P(KeptList, OfParticlesThatStartToFallIsMadeAnewInTime) {
+  // From rest they fall 0.1 H in nine substeps and 2 H in forty; a list has 0.2 H of it at most, and a
+  // substep that leads to the next.
+  Fixture f = flight(Vec3::Zero());
+  const double H = f.scene.support_radius(), dt = f.scene.time_step();
+  f.scene.gravity = Vec3(-0.2 * H / (81 * dt * dt), 0, 0);
+  const auto list = make("list:skin=0.2");
+  EXPECT_GE(rebuilds_of(*list, f, 40), 8);
+}
+
+TEST_P(KeptList, MissesNoPairOfRandomScenes) {
+  std::int64_t pairs = 0;
+  for (const char* name : {"list:verify=on", "list:verify=on:skin=0.05", "list:verify=on:trigger=local",
+                           "list:verify=on:build=all-pairs"})
+    for (std::uint32_t seed = 100; seed < 112; ++seed) {
+      const Fixture f = test::random_fixture(seed);
+      const auto list = make(name);
+      list->load(f.scene, sample_walls(f.scene), f.state);
+      for (int k = 0; k < 3; ++k) {
+        const Status status = list->advance(12);
+        EXPECT_EQ(status.bits & Status::missed_pair, 0u) << name << " " << seed << ": " << describe(status);
+        if (!status.ok()) break;
+      }
+      const PairTotals found = list->neighbor_stats().verified;
+      EXPECT_EQ(found.missed + found.wall_missed, 0) << name << " " << seed;
+      pairs += found.pairs + found.wall_pairs;
+    }
+  EXPECT_GT(pairs, 1'000'000);
+}
+
+TEST_P(KeptList, MissesNoPairWhereTheWallsAreFasterThanTheFluid) {
+  Scene scene = test::falling_points_scene();
+  scene.gravity.setZero();
+  scene.containers[0].tilt->keys = {{0.0, 0.0}, {0.02, 1.0}};
+  Fill water;
+  water.container = "source";
+  water.level = 0.06;
+  scene.fills = {water};
+  const Walls walls = sample_walls(scene);
+  for (const char* name : {"list:verify=on", "list:verify=on:trigger=local"}) {
+    const auto list = make(name);
+    list->load(scene, walls, initial_state(scene));
+    for (int k = 0; k < 10; ++k) ASSERT_EQ(list->advance(10).bits & Status::missed_pair, 0u) << name;
+    EXPECT_GT(list->neighbor_stats().verified.wall_pairs, 5'000) << name;
+    EXPECT_EQ(list->neighbor_stats().verified.wall_missed, 0) << name;
+  }
+}
+
+/// What is loaded anew knows nothing of its distance from the walls and looks for them.
+TEST_P(KeptList, WallsThatAreNotLookedForWouldNotHaveTouched) {
+  const auto expect_same = [&](const Scene& scene, const ParticleState& start, int substeps) {
+    const Walls walls = sample_walls(scene);
+    const auto once = make("brute"), again = make("brute");
+    once->load(scene, walls, start);
+    ParticleState one, other = start;
+    for (int k = 0; k < substeps; ++k) {
+      again->load(scene, walls, other);
+      if (!again->advance(1).ok() || !once->advance(1).ok()) return;
+      again->read(other);
+      once->read(one);
+      ASSERT_TRUE(one.position == other.position && one.velocity == other.velocity)
+          << scene.name << ", substep " << k;
+    }
+  };
+  for (std::uint32_t seed = 200; seed < 212; ++seed) {
+    const Fixture f = test::random_fixture(seed);
+    expect_same(f.scene, f.state, 20);
+  }
+  // Into the receiver, out of which it jumps, and out of the source's way.
+  Scene scene = test::falling_points_scene();
+  scene.contact.restitution = 0.9;
+  ParticleState start = initial_state(scene);
+  start.velocity.row(2).setConstant(-3);
+  start.quantise();
+  expect_same(scene, start, 150);
+}
+
+}  // namespace
+}  // namespace decant
