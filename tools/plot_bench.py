@@ -12,6 +12,7 @@ import matplotlib.pyplot as plt
 
 STAGES = ["build", "density", "force", "integrate"]
 COLORS = ["#4c78a8", "#f58518", "#54a24b", "#b279a2"]
+LABELS = {"force": "force (lists: and integration)"}
 PUBLISHED = {  # us a substep
     "brute": 176060.0,
     "list": 11340.0,
@@ -43,7 +44,7 @@ def main():
         for stage, color in zip(STAGES, COLORS):
             # Stages are launched apart; their shares are drawn, of the substep as it runs.
             share = (row["stages_us"] or {}).get(stage, 0) / total * 100
-            left.bar(place, share, bottom=bottom, color=color, label=stage if place == 0 else None)
+            left.bar(place, share, bottom=bottom, color=color, label=LABELS.get(stage, stage) if place == 0 else None)
             bottom += share
         left.text(place, 101, f"{row['substep_us']:.0f}", ha="center", va="bottom", fontsize=7)
     left.set_ylim(0, 112)
