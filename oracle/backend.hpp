@@ -38,7 +38,7 @@ struct Status {
 std::string describe(const Status& status);
 
 /// Seconds spent and number of passes timed, per stage of a substep, since `load`. A backend may time
-/// some substeps and not others.
+/// some substeps and not others. Integration in one pass with the forces is part of their time.
 struct StageTimes {
   struct Stage {
     double seconds = 0;

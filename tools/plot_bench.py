@@ -47,9 +47,9 @@ def main():
             left.bar(place, share, bottom=bottom, color=color, label=LABELS.get(stage, stage) if place == 0 else None)
             bottom += share
         left.text(place, 101, f"{row['substep_us']:.0f}", ha="center", va="bottom", fontsize=7)
-    left.set_ylim(0, 112)
+    left.set_ylim(0, 120)
     left.set_ylabel("share of a substep, % (µs above)")
-    left.legend(fontsize=8, loc="lower right", framealpha=0.9)
+    left.legend(fontsize=8, loc="upper center", ncol=len(STAGES), frameon=False)
     gains = [PUBLISHED[r["backend"]] / r["substep_us"] for r in rows]
     right.bar(places, gains, color="#4c78a8")
     for place, gain in zip(places, gains):
