@@ -21,15 +21,19 @@ struct FluidSource {
 
   /// What the density pass has not written yet.
   int2* desk() const { return reinterpret_cast<int2*>(a.point); }
-  /// Of lists that are kept, where it will be halfway through their time, if that is not too far.
+  /// Of lists that are kept, where it will be halfway through their time, if that is not too far. Asked
+  /// twice, once for the cell and once for the list, and two copies of an expression may be rounded
+  /// apart: so it must not jump where they could be.
   DECANT_DEVICE Float3 position(int i) const {
     const Float3 x = xyz(from.position[i]);
     if (!origin) return x;
+    const float most = 0.5f * sound_skin(a.mailbox->skin), limit = 0.999f * most;
+    // Where rounding counts beside the skin, far out, it is as near as it can be.
+    if (!(0x1p-22f * (fabsf(x.x) + fabsf(x.y) + fabsf(x.z)) <= 0.001f * most)) return x;
     const Float3 way = a.mailbox->ahead * xyz(from.velocity[i]);
-    const float most = 0.5f * sound_skin(a.mailbox->skin), square = dot(way, way);
-    const Float3 there =
-        x + (square > most * most ? 0.999f * most * radius(square).inverse : 1.0f) * way;
-    return dot(there - x, there - x) <= most * most ? there : x;  // rounding may have gone beyond
+    const float square = dot(way, way);
+    const Float3 there = x + (square > limit * limit ? limit * radius(square).inverse : 1.0f) * way;
+    return is_finite(there) ? there : x;
   }
   DECANT_DEVICE int id(int i) const { return a.id[i]; }
   DECANT_DEVICE void begin() const {

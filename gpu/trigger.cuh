@@ -128,7 +128,7 @@ struct WatchParticle {
     const float skin = seen.skin, wall_way = seen.wall_way;
     if (w.trigger == Trigger::global) {
       const float most = 0.5f * skin;
-      if (!(dot(d, d) <= most * most && wall_way <= most)) call();
+      if (!(dot(d, d) <= most * most && wall_way + rounding_of(x) <= most)) call();
       return;
     }
     const float farthest = 0.5f * c.H + skin, of_walls = seen.origin.w - wall_way - rounding_of(x);
