@@ -152,7 +152,7 @@ __global__ void __launch_bounds__(crew_block, 1)
 }
 
 /// Blocks of a crew that runs the kernel with so many bytes of shared memory a block: one on each
-/// multiprocessor, or 0 where there is no room for that.
+/// multiprocessor, as many as a sum has shares for; or 0 where there is no room for that.
 template <class Kernel>
 int crew_blocks(Kernel kernel, std::size_t desk) {
   int device = 0, blocks = 0, cooperates = 0, most_shared = 0, resident = 0;
@@ -166,14 +166,17 @@ int crew_blocks(Kernel kernel, std::size_t desk) {
   CUDA_CHECK(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
                                   static_cast<int>(desk)));
   CUDA_CHECK(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, kernel, crew_block, desk));
-  return resident < 1 ? 0 : blocks;
+  return resident < 1 ? 0 : std::min(blocks, PrefixSum::most_shares);
 }
 
-/// Runs the substep so many times in one launch, whose blocks have so many bytes of shared memory. Whether
-/// the device can: if it has no room for a block on each of its multiprocessors, nothing is done.
+/// Runs the substep so many times in one launch. Whether the device can: if it has no room for a block on
+/// each of its multiprocessors, nothing is done.
 template <class Build, class Density, class Move>
-bool repeat(Queue& queue, int times, const Substep<Build, Density, Move>& substep, std::size_t desk) {
+bool repeat(Queue& queue, int times, const Substep<Build, Density, Move>& substep) {
   const auto kernel = substeps_kernel<Substep<Build, Density, Move>>;
+  const std::size_t desk = std::max({desk_bytes(substep.build, crew_block),
+                                     desk_bytes(substep.density, crew_block),
+                                     desk_bytes(substep.move, crew_block)});
   const int blocks = queue.remembered(reinterpret_cast<const void*>(kernel),
                                       [&] { return crew_blocks(kernel, desk); });
   if (blocks == 0) return false;
@@ -194,7 +197,7 @@ bool repeat(Queue& queue, int times, const Substep<Build, Density, Move>& subste
 #else
 
 template <class Build, class Density, class Move>
-bool repeat(Queue& queue, int times, const Substep<Build, Density, Move>& substep, std::size_t) {
+bool repeat(Queue& queue, int times, const Substep<Build, Density, Move>& substep) {
   using Clock = std::chrono::steady_clock;
   auto last = Clock::now();
   const auto lap = [&](int stage) {

@@ -237,30 +237,22 @@ class GridSearch {
     using After = WatchParticle<periodic>;
     const Query query = list_query<periodic>(a);
     const FluidSource source = fluid_source(a, geometry);
-    const int moving = walls_.moving_count(), first = walls_.first_moving;
+    const int moving = walls_.moving_count();
     const auto density =
         Beside<EachGroup<lanes, DensityPass<Query, false>>, Each<PlaceWallsPass<PlacedFor::force>>>{
-            {n_, {c_, a, query, {}, walls_.walls.id}}, {moving, {a, walls_.walls, first}}};
+            {n_, {c_, a, query, {}, walls_.walls.id}},
+            {moving, walls_.moving<PlacedFor::force>(a)}};
     const auto move = Beside<EachGroup<lanes, ForcePass<Query, false, Mover<After>>>,
                              Each<PlaceWallsPass<PlacedFor::density>>>{
         {n_, {c_, a, query, {}, {c_, a, geometry, {c_, a, watch()}}}},
-        {moving, {a, walls_.walls, first}}};
+        {moving, walls_.moving<PlacedFor::density>(a)}};
     const auto build = in_order(fluid_.count(n_, source, scratch_),
                                 fluid_.place_counted(n_, source, scratch_),
                                 collect<lanes, periodic>(a));
     using Whole = Substep<std::decay_t<decltype(build)>, std::decay_t<decltype(density)>,
                           std::decay_t<decltype(move)>>;
     return repeat(queue, substeps,
-                  Whole{&a.mailbox->stale, build, density, move, a.mailbox->stage_ns},
-                  crew_desk<lanes, periodic>());
-  }
-  template <int lanes, bool periodic>
-  static std::size_t crew_desk() {
-#ifdef __CUDACC__
-    return desk_bytes<lanes, CollectPass<periodic>>(crew_block);
-#else
-    return 0;
-#endif
+                  Whole{&a.mailbox->stale, build, density, move, a.mailbox->stage_ns});
   }
 
   Candidates candidates(const Arrays& a) const {

@@ -22,7 +22,10 @@ struct WallStore {
   /// Slots [first, first + moving_count) hold all that moves.
   int first_moving = 0, moving_end = 0;
   int moving_count() const { return moving_end - first_moving; }
-  PosePass moving(const Arrays& a) const { return {a, walls, first_moving}; }
+  template <PlacedFor what = PlacedFor::both>
+  PlaceWallsPass<what> moving(const Arrays& a) const {
+    return {a, walls, first_moving};
+  }
 };
 
 /// Stage times, where they are wanted.

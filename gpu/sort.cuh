@@ -15,9 +15,6 @@ namespace decant::gpu::DECANT_EXECUTOR {
 
 /// Device memory that a sort needs; several sorts one after the other may share one.
 struct SortScratch {
-  // Blocks of a crew, at most: a sum over buckets is formed in as many shares.
-  static constexpr std::size_t most_blocks = 1024;
-
   Buffer<int> key, slot;
   Buffer<char> scan;
 
@@ -28,7 +25,8 @@ struct SortScratch {
       slot.resize(n);
     }
     Queue::reserve_scan(buckets + 1, scan);
-    if (scan.bytes() < sizeof(int) * most_blocks) scan.resize(sizeof(int) * most_blocks);
+    constexpr std::size_t shares = PrefixSum::most_shares * sizeof(int);
+    if (scan.bytes() < shares) scan.resize(shares);
   }
   std::size_t bytes() const { return key.bytes() + slot.bytes() + scan.bytes(); }
 };

@@ -5,6 +5,8 @@
 
 #include "gpu/exec.cuh"
 
+#include <algorithm>
+
 namespace decant::gpu::DECANT_EXECUTOR {
 
 /// body(i) for i in 0 … n−1.
@@ -28,6 +30,7 @@ EachGroup<lanes, Body> each_group(int n, const Body& body) {
 /// out[k] = in[0] + … + in[k−1], k < n. Both have room for whole fours; what `in` has there is nothing.
 struct PrefixSum {
   static constexpr int more_room = 4;
+  static constexpr int most_shares = 1024;
   const int* in;
   int* out;
   int n;
@@ -82,6 +85,33 @@ void start(Queue& queue, const InOrder<First, Rest...>& steps) {
   start(queue, steps.rest);
 }
 
+/// Bytes of shared memory that a body wants for a block of so many threads; a step, that its bodies want.
+template <int lanes, class Body>
+constexpr std::size_t desk_bytes(int threads) {
+  if constexpr (requires { Body::template desk_bytes<lanes>(threads); })
+    return Body::template desk_bytes<lanes>(threads);
+  else
+    return 0;
+}
+template <class Body>
+std::size_t desk_bytes(const Each<Body>&, int) {
+  return 0;
+}
+template <int lanes, class Body>
+std::size_t desk_bytes(const EachGroup<lanes, Body>&, int threads) {
+  return desk_bytes<lanes, Body>(threads);
+}
+inline std::size_t desk_bytes(const PrefixSum&, int) { return 0; }
+template <class First, class Second>
+std::size_t desk_bytes(const Beside<First, Second>& steps, int threads) {
+  return std::max(desk_bytes(steps.first, threads), desk_bytes(steps.second, threads));
+}
+inline std::size_t desk_bytes(const InOrder<>&, int) { return 0; }
+template <class First, class... Rest>
+std::size_t desk_bytes(const InOrder<First, Rest...>& steps, int threads) {
+  return std::max(desk_bytes(steps.first, threads), desk_bytes(steps.rest, threads));
+}
+
 /// What a substep consists of.
 template <class Build, class Density, class Move>
 struct Substep {
@@ -91,14 +121,5 @@ struct Substep {
   Move move;
   long long* stage_ns;   // [3] of the device's: the time that each of the three took, added up
 };
-
-/// Bytes of shared memory that a body wants for a block of so many threads.
-template <int lanes, class Body>
-constexpr std::size_t desk_bytes(int threads) {
-  if constexpr (requires { Body::template desk_bytes<lanes>(threads); })
-    return Body::template desk_bytes<lanes>(threads);
-  else
-    return 0;
-}
 
 }  // namespace decant::gpu::DECANT_EXECUTOR
