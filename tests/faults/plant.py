@@ -2,12 +2,14 @@
 
 plant.py GPU_FOLDER OUT             the catalogue's faults
 plant.py GPU_FOLDER OUT --mutate N  N mutations of operators and constants, chosen by --seed
+plant.py GPU_FOLDER OUT --catalogue heldout   the faults of heldout.py instead of the catalogue's
 
 Leaves OUT/gpu/… and OUT/faults.json, which lists them for run_faults.cpp. Files that stay the same
 are not touched, so that nothing is compiled for nothing.
 """
 
 import argparse
+import importlib
 import json
 import random
 import re
@@ -120,6 +122,7 @@ def main():
     p.add_argument("out", type=Path)
     p.add_argument("--mutate", type=int, metavar="N")
     p.add_argument("--seed", type=int, default=1)
+    p.add_argument("--catalogue", default="catalogue", metavar="MODULE", help="where FAULTS are listed")
     a = p.parse_args()
     texts = {f.name: f.read_text() for f in sorted(a.source.iterdir()) if f.name != "CMakeLists.txt"}
     if a.mutate:
@@ -127,13 +130,13 @@ def main():
         listed = mutated(texts, kept)
         print(f"{len(kept)} of {every} mutations")
     else:
-        from catalogue import FAULTS
-        listed = [dict(f, number=k) for k, f in enumerate(FAULTS, 1)]
+        faults = importlib.import_module(a.catalogue).FAULTS
+        listed = [dict(f, number=k) for k, f in enumerate(faults, 1)]
         changes = [(f["number"], f["name"], *change) for f in listed for change in f["changes"]]
         for file in {c[2] for c in changes}:
             texts[file] = planted(texts[file], [(*c[:2], *c[3:]) for c in changes if c[2] == file],
                                   file)
-    for file in ("exec.cuh", "device_scene.hpp"):
+    for file in ("exec.cuh", "device_scene.hpp", "options.hpp"):
         texts[file] = texts[file].replace("#pragma once\n", '#pragma once\n\n#include "gpu/fault.hpp"\n', 1)
     texts["fault.hpp"] = Path(__file__).with_name("fault.hpp").read_text()
     if not a.mutate:
