@@ -40,8 +40,8 @@ std::string fuzz_faults(const nlohmann::json& faults, Executor executor, int job
     if (f["on"] != "cuda" || executor == Executor::cuda) planted.push_back(f);
   // A fault by which the campaign itself cannot run is not found: what throws is no crash.
   const std::vector<Said> found = in_processes(planted.size(), jobs, 300, [&](std::size_t k) {
-    choose_fault(executor, planted[k]["number"]);
-    return campaign_text(planted[k]["backend"], executor, most_cases, first_seed);
+    choose_fault(executor, planted[k]["number"].get<int>());
+    return campaign_text(planted[k]["backend"].get<std::string>(), executor, most_cases, first_seed);
   });
   std::string table = fmt::format("{:<26} {:<22} {:>8} {:>10} {:>8} {:>6}  {}\n", "fault", "backend",
                                   "problems", "particles", "shrunk", "tries",

@@ -65,6 +65,12 @@ void say(const CheckRow& row, std::ostream& out) {
   out << row.check << '\t' << row.field << '\t' << row.score << '\n';
 }
 
+/// What plant.py says of a fault.
+std::string text(const nlohmann::json& fault, const char* key) {
+  return fault.at(key).get<std::string>();
+}
+int number(const nlohmann::json& fault) { return fault.at("number").get<int>(); }
+
 /// In the child: judges; the failing rows.
 std::string failing_rows(const Trial& trial, Executor executor, const Prepared& p) {
   choose_fault(executor, trial.number);
@@ -165,22 +171,22 @@ int run_catalogue(const Settings& s, const nlohmann::json& faults, Executor exec
   std::vector<nlohmann::json> planted;
   std::size_t not_run = 0;
   for (const auto& f : faults) {
-    if (!s.only.empty() && std::count(s.only.begin(), s.only.end(), f["name"]) == 0) continue;
+    if (!s.only.empty() && std::count(s.only.begin(), s.only.end(), text(f, "name")) == 0) continue;
     if (f["on"] == "cuda" && executor != Executor::cuda) {
       ++not_run;
       continue;
     }
-    trials.push_back({f["number"], f["backend"], f["fixture"]});
+    trials.push_back({number(f), text(f, "backend"), text(f, "fixture")});
     planted.push_back(f);
   }
   const auto prepared = prepare_all(trials, s.folder);
   const auto outcomes = run_all(trials, executor, s.jobs, prepared);
-  std::string table = fmt::format("{:<26} {:<17} {:<16} {:>9}  {}\n", "fault", "backend",
-                                  "check", "factor", "what is wrong; what fails besides");
+  std::string table = fmt::format("{:<26} {:<17} {:<16} {:>9}  {}\n", "fault", "backend", "check",
+                                  "factor", "what is wrong; what fails besides");
   std::size_t caught = 0, near = 0;
   for (std::size_t t = 0; t < trials.size(); ++t) {
     const Outcome& o = outcomes[t];
-    const std::string check = planted[t]["check"];
+    const std::string check = text(planted[t], "check");
     const auto hit = o.failed.find(check);
     caught += hit != o.failed.end();
     near += hit != o.failed.end() && hit->second < 10;
@@ -188,23 +194,22 @@ int run_catalogue(const Settings& s, const nlohmann::json& faults, Executor exec
                                : !(hit->second < 1e6) ? "no bound"
                                                       : fmt::format("{:.3g}", hit->second);
     const std::string others = joined(o.failed, check);
-    table += fmt::format("{:<26} {:<17} {:<16} {:>9}  {}; {}\n",
-                         planted[t]["name"].get<std::string>(), trials[t].backend, check, factor,
-                         planted[t]["what"].get<std::string>(),
-                         !o.ended.empty()   ? o.ended
+    table += fmt::format("{:<26} {:<17} {:<16} {:>9}  {}; {}\n", text(planted[t], "name"),
+                         trials[t].backend, check, factor, text(planted[t], "what"),
+                         !o.ended.empty() ? o.ended
                          : others.empty() ? "nothing"
-                                            : others);
+                                          : others);
   }
   for (const auto& f : faults)
     if (s.only.empty() && f["on"] == "cuda" && executor != Executor::cuda)
-      table += fmt::format("{:<26} {:<17} {:<16} {:>9}  {}\n", f["name"].get<std::string>(),
-                           f["backend"].get<std::string>(), f["check"].get<std::string>(), "not_run",
-                           f["what"].get<std::string>());
+      table += fmt::format("{:<26} {:<17} {:<16} {:>9}  {}\n", text(f, "name"), text(f, "backend"),
+                           text(f, "check"), "not_run", text(f, "what"));
   const std::string wrong = failures_without_fault(clean(trials), executor, s.jobs, prepared);
-  table += wrong + fmt::format("{} of {} caught by the check that is there for it, {} by a factor below 10; "
-                               "{} not_run here; without a fault {}\n",
-                               caught, trials.size(), near, not_run,
-                               wrong.empty() ? "all pass" : "SOME FAIL");
+  table +=
+      wrong + fmt::format(
+                  "{} of {} caught by the check that is there for it, {} by a factor below 10; "
+                  "{} not_run here; without a fault {}\n",
+                  caught, trials.size(), near, not_run, wrong.empty() ? "all pass" : "SOME FAIL");
   return finish(s, table, caught == trials.size() && wrong.empty());
 }
 
@@ -257,25 +262,24 @@ int run_mutations(const Settings& s, const nlohmann::json& faults, Executor exec
       if ((faults[k]["file"] == "brute_force.cuh") != (backend == "brute") &&
           faults[k]["file"] == "brute_force.cuh")
         continue;
-      trials.push_back({faults[k]["number"], backend, fixture, checks});
+      trials.push_back({number(faults[k]), backend, fixture, checks});
       which.push_back(k);
     }
     const auto outcomes = run_all(trials, executor, s.jobs, prepared);
     if (s.verbose) {
       std::cerr << fmt::format("{} on {}: {} left\n", backend, fixture, trials.size());
-      for (const auto k : which)
-        std::cerr << "  " << faults[k]["name"].get<std::string>() << '\n';
+      for (const auto k : which) std::cerr << "  " << text(faults[k], "name") << '\n';
     }
     for (std::size_t t = 0; t < trials.size(); ++t)
       if (outcomes[t].caught)
-        by[which[t]] = fmt::format("{}, {}: {}", backend, fixture,
-                                   outcomes[t].ended.empty() ? joined(outcomes[t].failed, "")
-                                                             : outcomes[t].ended);
+        by[which[t]] = fmt::format(
+            "{}, {}: {}", backend, fixture,
+            outcomes[t].ended.empty() ? joined(outcomes[t].failed, "") : outcomes[t].ended);
   }
   std::size_t caught = 0, explained = 0;
   std::string table;
   for (std::size_t k = 0; k < faults.size(); ++k) {
-    const std::string line = faults[k]["line"], what = faults[k]["what"];
+    const std::string line = text(faults[k], "line"), what = text(faults[k], "what");
     std::string verdict = by[k];
     if (!verdict.empty()) {
       ++caught;
@@ -285,14 +289,16 @@ int run_mutations(const Settings& s, const nlohmann::json& faults, Executor exec
     } else {
       verdict = "SURVIVES";
     }
-    table += fmt::format("{:<24} {}: {}\n{:<24} {}\n", faults[k]["name"].get<std::string>(), what, line,
-                         "", verdict);
+    table +=
+        fmt::format("{:<24} {}: {}\n{:<24} {}\n", text(faults[k], "name"), what, line, "", verdict);
   }
   const std::string wrong = failures_without_fault(used, executor, s.jobs, prepared);
-  table += wrong + fmt::format("{} mutations: {} caught, {} equivalent with a reason, {} survive; without a "
-                               "mutation {}\n",
-                               faults.size(), caught, explained, faults.size() - caught - explained,
-                               wrong.empty() ? "all pass" : "SOME FAIL");
+  table +=
+      wrong + fmt::format(
+                  "{} mutations: {} caught, {} equivalent with a reason, {} survive; without a "
+                  "mutation {}\n",
+                  faults.size(), caught, explained, faults.size() - caught - explained,
+                  wrong.empty() ? "all pass" : "SOME FAIL");
   return finish(s, table, caught + explained == faults.size() && wrong.empty());
 }
 

@@ -23,18 +23,34 @@ struct Object {
   bool is_dataset;
 };
 
+/// The root, then everything below it, by name. Through links and attributes, which HDF5 1.10 and 1.14
+/// declare alike; H5Ovisit and H5Oget_info they do not.
 std::vector<Object> objects_in(hid_t file) {
-  std::vector<Object> found;
-  H5Ovisit2(
+  std::vector<Object> found = {{"/", false}};
+  H5Lvisit(
       file, H5_INDEX_NAME, H5_ITER_INC,
-      [](hid_t, const char* name, const H5O_info_t* info, void* out) -> herr_t {
+      [](hid_t root, const char* name, const H5L_info_t* link, void* out) -> herr_t {
+        if (link->type != H5L_TYPE_HARD) return 0;
+        const Handle object(H5Oopen(root, name, H5P_DEFAULT));
         static_cast<std::vector<Object>*>(out)->push_back(
-            {std::string(name) == "." ? "/" : "/" + std::string(name),
-             info->type == H5O_TYPE_DATASET});
+            {"/" + std::string(name), H5Iget_type(object.get()) == H5I_DATASET});
         return 0;
       },
-      &found, H5O_INFO_BASIC);
+      &found);
   return found;
+}
+
+std::vector<std::string> attributes_of(hid_t object) {
+  std::vector<std::string> names;
+  hsize_t next = 0;
+  H5Aiterate2(
+      object, H5_INDEX_NAME, H5_ITER_INC, &next,
+      [](hid_t, const char* name, const H5A_info_t*, void* out) -> herr_t {
+        static_cast<std::vector<std::string>*>(out)->push_back(name);
+        return 0;
+      },
+      &names);
+  return names;
 }
 
 class Edit {
@@ -139,17 +155,15 @@ class Edit {
 
   void change_attribute(const std::string& path) {
     const Handle object(H5Oopen(file_, path.c_str(), H5P_DEFAULT));
-    H5O_info_t info;
-    if (H5Oget_info2(object.get(), &info, H5O_INFO_NUM_ATTRS) < 0 || info.num_attrs == 0) return;
-    std::array<char, 256> name{};
-    H5Aget_name_by_idx(object.get(), ".", H5_INDEX_NAME, H5_ITER_INC, pick(info.num_attrs),
-                       name.data(), name.size(), H5P_DEFAULT);
-    H5Adelete(object.get(), name.data());
+    const std::vector<std::string> names = attributes_of(object.get());
+    if (names.empty()) return;
+    const std::string& name = names[pick(names.size())];
+    H5Adelete(object.get(), name.c_str());
     if (pick(4) == 0) return;
     bool large = false;
     const Handle its_space = space(large), its_type(type());
     if (large) return;
-    const Handle attribute(H5Acreate2(object.get(), name.data(), its_type.get(), its_space.get(),
+    const Handle attribute(H5Acreate2(object.get(), name.c_str(), its_type.get(), its_space.get(),
                                       H5P_DEFAULT, H5P_DEFAULT));
     const double value = strange_number();
     if (H5Sget_simple_extent_npoints(its_space.get()) == 1)
