@@ -50,11 +50,12 @@ class FluidChecks {
       if (fill.box && container)
         box_in_container(*fill.box, *container, key + ".box");
       else if (fill.box)
-        free_box(*fill.box, key + ".box");
+        free_box(fill, key + ".box");
       else if (container)
         level(fill.level, *container, key + ".level");
       else
         throw InputError(file_, key, "neither container nor box", "one of them");
+      goes_around(fill, key);
       particles.push_back(particles_of(fill, key));
       stays_in_domain(particles.back(), key);
       clear_of_walls(particles.back(), container, key);
@@ -106,7 +107,8 @@ class FluidChecks {
     clear_of_boxes(box, shape, container.name, key);
   }
 
-  void free_box(const SolidBox& box, const std::string& key) const {
+  void free_box(const Fill& fill, const std::string& key) const {
+    const SolidBox& box = *fill.box;
     if (!((box.min.array() >= scene_.domain.min.array() - tolerance_).all() &&
           (box.max.array() <= scene_.domain.max.array() + tolerance_).all()))
       throw InputError(file_, key, box_text(box),
@@ -114,10 +116,26 @@ class FluidChecks {
     if (scene_.floor && !(box.min.z() >= scene_.floor->height - tolerance_))
       throw InputError(file_, key + ".min[2]", to_text(box.min.z()),
                        ">= " + to_text(scene_.floor->height) + ", the floor's height");
-    for (const auto& container : scene_.containers)
-      if (const auto* shape = std::get_if<BoxShape>(&container.shape); shape && !container.tilt)
+    for (const auto& container : scene_.containers) {
+      const auto* shape = std::get_if<BoxShape>(&container.shape);
+      if (shape && !moves(container) && !is_around(fill, container.name))
         clear_of_boxes({box.min - container.origin, box.max - container.origin}, *shape,
                        container.name, key);
+    }
+  }
+
+  static bool is_around(const Fill& fill, const std::string& name) {
+    return std::find(fill.around.begin(), fill.around.end(), name) != fill.around.end();
+  }
+
+  void goes_around(const Fill& fill, const std::string& key) const {
+    for (const auto& name : fill.around) {
+      const bool there =
+          std::any_of(scene_.containers.begin(), scene_.containers.end(),
+                      [&](const Container& c) { return c.name == name; });
+      if (!there || name == fill.container)
+        throw InputError(file_, key + ".around", name, "the name of another container");
+    }
   }
 
   /// \param box  in the frame of the union
@@ -173,7 +191,8 @@ class FluidChecks {
               "a particle at (" + to_text(rounded(x(0, i))) + ", " + to_text(rounded(x(1, i))) +
                   ", " + to_text(rounded(x(2, i))) + "), " + to_text(rounded(distance)) +
                   " from the solid of " + container.name,
-              "at least dx/2 = " + to_text(0.5 * scene_.particle_spacing) + " from every wall");
+              "at least dx/2 = " + to_text(0.5 * scene_.particle_spacing) +
+                  " from every wall; a fill leaves room for what its `around` names");
       }
     }
   }

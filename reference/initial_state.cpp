@@ -5,6 +5,7 @@
 #include "reference/distance.hpp"
 #include "reference/pose.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -56,6 +57,30 @@ Lattice lattice_in(const RevolvedShape& shape, double level, double dx) {
           {2 * half, 2 * half, static_cast<int>(std::floor(level / dx + 1e-6))}};
 }
 
+/// The containers that a fill goes around, as they stand at the start.
+class Immersed {
+ public:
+  Immersed(const Scene& scene, const Fill& fill) {
+    for (const auto& c : scene.containers)
+      if (std::find(fill.around.begin(), fill.around.end(), c.name) != fill.around.end())
+        bodies_.push_back({SolidDistance(c), pose_at(c, 0.0)});
+  }
+  /// Whether all their solids are `least` (m) away from a point of the world, or farther.
+  bool leave_room(const Vec3& world, double least) const {
+    return std::all_of(bodies_.begin(), bodies_.end(), [&](const Body& body) {
+      const Vec3 local = body.pose.to_local(world);
+      return !body.solid.may_be_within(least, local) || body.solid.at(local).distance >= least;
+    });
+  }
+
+ private:
+  struct Body {
+    SolidDistance solid;
+    Pose pose;
+  };
+  std::vector<Body> bodies_;
+};
+
 }  // namespace
 
 ParticleState initial_state(const Scene& scene) {
@@ -79,6 +104,7 @@ ParticleState initial_state(const Scene& scene) {
     }
     const auto solid = container ? std::optional<SolidDistance>(*container) : std::nullopt;
     const Pose pose = container ? pose_at(*container, 0.0) : Pose{};
+    const Immersed immersed(scene, fill);
     const std::size_t before = position.size();
     for (int k = 0; k < lattice.size[2]; ++k)
       for (int j = 0; j < lattice.size[1]; ++j)
@@ -88,6 +114,7 @@ ParticleState initial_state(const Scene& scene) {
           if (solid &&
               (!solid->in_cavity(x) || solid->at(x).distance < 0.5 * dx * (1 - 1e-6)))
             continue;
+          if (!immersed.leave_room(pose.to_world(x), 0.5 * dx * (1 - 1e-6))) continue;
           position.push_back(pose.to_world(x));
           velocity.push_back(fill.velocity_at(position.back()));
         }

@@ -101,6 +101,8 @@ struct Fill {
   Eigen::Matrix3d velocity_gradient = Eigen::Matrix3d::Zero();  // 1/s
   Vec3 gradient_about = Vec3::Zero();                           // m
   std::optional<RoundShape> round = std::nullopt;  // what there is of `box`, its bounds
+  /// Names of containers within the fluid: no particle starts within dx/2 of their solids.
+  std::vector<std::string> around = {};
 
   Vec3 velocity_at(const Vec3& x) const {
     return velocity + velocity_gradient * (x - gradient_about);

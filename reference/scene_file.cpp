@@ -239,16 +239,23 @@ RoundShape read_round(const JsonValue& fill) {
 Fill read_fill(const JsonValue& v, const std::vector<Container>& containers) {
   v.check_keys(keys_of("fill"));
   Fill fill;
-  if (v.has("container")) {
-    fill.container = v["container"].text();
+  const auto name_of_container = [&](const JsonValue& name) {
     std::string names;
-    bool found = false;
     for (const auto& c : containers) {
+      if (c.name == name.text()) return c.name;
       names += (names.empty() ? "" : ", ") + c.name;
-      found = found || c.name == fill.container;
     }
-    if (!found) v["container"].refuse("the name of a container: " + names);
-  }
+    name.refuse("the name of a container: " + names);
+  };
+  if (v.has("container")) fill.container = name_of_container(v["container"]);
+  if (v.has("around"))
+    for (const auto& name : v["around"].elements(1, 100)) {
+      const std::string other = name_of_container(name);
+      if (other == fill.container) name.refuse("another container than the one that is filled");
+      if (std::find(fill.around.begin(), fill.around.end(), other) != fill.around.end())
+        name.refuse("each container once");
+      fill.around.push_back(other);
+    }
   if (v.has("level") + v.has("box") + v.has("ball") + v.has("rod") != 1)
     v.refuse("exactly one of level, box, ball, rod");
   if (v.has("level")) {
@@ -316,7 +323,7 @@ const std::vector<ObjectKeys>& scene_file_keys() {
       {"tilt_key", {"time"}, {"angle", "angle_deg"}},
       {"fill",
        {},
-       {"container", "level", "box", "ball", "rod", "velocity", "velocity_gradient"}},
+       {"container", "level", "box", "ball", "rod", "around", "velocity", "velocity_gradient"}},
       {"ball", {"center", "radius"}, {}},
       {"rod", {"center", "radius", "axis", "length"}, {}},
       {"velocity_gradient", {"matrix", "about"}, {}},

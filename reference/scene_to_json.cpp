@@ -69,6 +69,7 @@ json fill_json(const Fill& fill) {
     out["box"] = box_json(*fill.box);
   else
     out["level"] = fill.level;
+  if (!fill.around.empty()) out["around"] = fill.around;
   out["velocity"] = vector_json(fill.velocity);
   if (!fill.velocity_gradient.isZero(0)) {
     json matrix = json::array();
