@@ -194,7 +194,7 @@ std::vector<DevicePose> make_poses(const Scene& scene, std::int64_t first, int c
       d.translation = to_float3(pose.translation);
       d.pivot = to_float3(pose.pivot);
       d.omega = to_float3(pose.angular_velocity);
-      d.surface = to_float3(pose.surface_velocity);
+      d.surface = to_float3(pose.linear_velocity + pose.surface_velocity);
       d.step = static_cast<float>(move[s](pose));
       poses.push_back(d);
     }

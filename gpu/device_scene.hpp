@@ -71,7 +71,8 @@ struct Geometry {
   std::vector<Face> faces;
 };
 
-/// x_world = R x_local + translation; velocity = omega × (x_world − pivot) + surface.
+/// x_world = R x_local + translation; velocity = omega × (x_world − pivot) + surface, which is what the
+/// pivot moves with and what the surface slides with over its place, together.
 struct DevicePose {
   float R[9];  // row by row
   Float3 translation, pivot, omega, surface;

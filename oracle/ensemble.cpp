@@ -55,8 +55,17 @@ class Disturbance {
     of(scene.schedule.end);
     of(scene.contact.distance_ratio);
     if (scene.floor) of(scene.floor->height);
-    for (Container& c : scene.containers)
+    for (Container& c : scene.containers) {
       for (double& x : c.origin) of(x);
+      if (c.translation) of(*c.translation);
+    }
+  }
+  void of(Translation& translation) {
+    for (TranslationKey& key : translation.keys)
+      for (double& x : key.offset) of(x);
+    for (double& v : translation.velocity) of(v);
+    if (translation.oscillation)
+      for (double& x : translation.oscillation->amplitude) of(x);
   }
 
  private:

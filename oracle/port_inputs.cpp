@@ -65,7 +65,7 @@ void write_walls(Hdf5Writer& out, const Scene& scene, const Walls& walls, double
 /// Where each container's frame is at a time (s), and how it moves.
 void write_poses(Hdf5Writer& out, const std::string& group, const Scene& scene, double time) {
   const auto n = static_cast<Eigen::Index>(scene.containers.size());
-  Eigen::Matrix3Xd axes[3], translation(3, n), pivot(3, n), spin(3, n), belt(3, n);
+  Eigen::Matrix3Xd axes[3], translation(3, n), pivot(3, n), spin(3, n), belt(3, n), linear(3, n);
   for (auto& axis : axes) axis.resize(3, n);
   for (Eigen::Index c = 0; c < n; ++c) {
     const Pose pose = pose_at(scene.containers[static_cast<std::size_t>(c)], time);
@@ -74,6 +74,7 @@ void write_poses(Hdf5Writer& out, const std::string& group, const Scene& scene, 
     pivot.col(c) = pose.pivot;
     spin.col(c) = pose.angular_velocity;
     belt.col(c) = pose.surface_velocity;
+    linear.col(c) = pose.linear_velocity;
   }
   out.attribute(group, "time", time);
   const char* names[3] = {"/x_axis", "/y_axis", "/z_axis"};
@@ -82,6 +83,7 @@ void write_poses(Hdf5Writer& out, const std::string& group, const Scene& scene, 
   out.matrix3(group + "/translation", translation, "m", "the frame's origin, in the world");
   out.matrix3(group + "/pivot", pivot, "m", "in the world");
   out.matrix3(group + "/angular_velocity", spin, "rad/s", "about the pivot");
+  out.matrix3(group + "/linear_velocity", linear, "m/s", "of the pivot");
   out.matrix3(group + "/surface_velocity", belt, "m/s", "of the surface over its place, in the world");
 }
 

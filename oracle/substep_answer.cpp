@@ -50,7 +50,8 @@ void widen(const Scene& scene, const Pose& pose, double distance, double tau_n, 
   p.tau_v.array() += (1 + scene.contact.restitution + scene.contact.friction) *
                          (2 * w.norm() * tau_n + p.tau_v.norm()) +
                      2 * omega * (p.tau_x.norm() + 4 * u * (p.x.norm() + pose.pivot.norm())) +
-                     4 * u * (p.v.norm() + w.norm());
+                     4 * u * (p.v.norm() + w.norm() + pose.linear_velocity.norm() +
+                              pose.surface_velocity.norm());
 }
 
 /// The push-out itself, also where the oracle's own distance is not within reach.

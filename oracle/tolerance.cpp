@@ -164,7 +164,7 @@ class Bounds {
     }
   }
 
-  /// Rounding of v_b = omega × (x_b − pivot) + v_surface, by wall particle, m/s.
+  /// Rounding of v_b = omega × (x_b − pivot) + v_pivot + v_surface, by wall particle, m/s.
   void wall_velocity_error(const Walls& walls) {
     wall_velocity_error_.resize(walls.size());
     Eigen::Index b = 0;
@@ -173,7 +173,7 @@ class Bounds {
       for (Eigen::Index k = 0; k < walls.containers[c].position.cols(); ++k, ++b)
         wall_velocity_error_[b] =
             pose.angular_velocity.norm() * (X_[b] + pose.pivot.cwiseAbs().maxCoeff()) +
-            pose.surface_velocity.norm();
+            pose.linear_velocity.norm() + pose.surface_velocity.norm();
     }
   }
 

@@ -61,6 +61,11 @@ TransformedProblem turned(const Scene& scene, const ParticleState& state) {
       c.tilt->pivot = turned(c.tilt->pivot);
       c.tilt->axis = turned(c.tilt->axis);
     }
+    if (c.translation) {
+      for (TranslationKey& key : c.translation->keys) key.offset = turned(key.offset);
+      c.translation->velocity = turned(c.translation->velocity);
+      if (auto& o = c.translation->oscillation) o->amplitude = turned(o->amplitude);
+    }
     auto* boxes = std::get_if<BoxShape>(&c.shape);
     if (!boxes) continue;
     boxes->cavity = turned(boxes->cavity);

@@ -33,18 +33,43 @@ struct FluidProperties {
   double wall_viscosity = 0.1;   // Pa·s; twice the viscosity unless the scene says otherwise
 };
 
-/// One point of a tilt schedule. Between two keys the angle follows the smoothstep 3s² − 2s³;
-/// before the first and after the last it rests.
-struct TiltKey {
-  double time;   // s
-  double angle;  // rad, right-handed about the axis
+/// amplitude · sin(2π frequency t + phase), added to what the keys of a schedule say.
+template <class Value>
+struct Oscillation {
+  Value amplitude;
+  double frequency;  // Hz, > 0
+  double phase = 0;  // rad
 };
 
-/// Rigid rotation of a container about a fixed line in the world.
+/// One point of a tilt schedule. Between two keys the angle follows the smoothstep 3s² − 2s³;
+/// before the first it rests, after the last it goes on at the tilt's rate.
+struct TiltKey {
+  double time;   // s
+  double angle;  // rad, right-handed about the axis; any number of turns
+};
+
+/// Rigid rotation of a container about a line, which goes along with the container's translation.
 struct Tilt {
-  Vec3 pivot;                 // m, world, a point of the line
+  Vec3 pivot;                 // m, a point of the line, world before any translation
   Vec3 axis;                  // unit vector
-  std::vector<TiltKey> keys;  // times strictly increasing
+  std::vector<TiltKey> keys;  // at least one; times strictly increasing
+  /// rad/s after the last key. Where it is not 0 and there are two keys or more, the last smoothstep
+  /// ends with this slope: rate · T (s³ − s²) is added to it, T being the time between the keys.
+  double rate = 0;
+  std::optional<Oscillation<double>> oscillation = std::nullopt;  // rad
+};
+
+/// One point of a translation schedule, between keys as in a tilt.
+struct TranslationKey {
+  double time;  // s
+  Vec3 offset;  // m, world, from where the container's origin and tilt have it
+};
+
+/// Rigid translation of a container, of its tilt's line too.
+struct Translation {
+  std::vector<TranslationKey> keys = {{0.0, Vec3::Zero()}};  // at least one; times strictly increasing
+  Vec3 velocity = Vec3::Zero();  // m/s after the last key, which it is reached at as a tilt's rate is
+  std::optional<Oscillation<Vec3>> oscillation = std::nullopt;  // m
 };
 
 /// Solid of revolution about the frame's z axis. `profile` is the closed outline of the solid's
@@ -69,11 +94,12 @@ struct BoxShape {
 struct Container {
   std::string name;
   std::variant<RevolvedShape, BoxShape> shape;
-  Vec3 origin = Vec3::Zero();  // m, world position of the container's frame while untilted
+  Vec3 origin = Vec3::Zero();  // m, world position of the container's frame while it is not moved
   double wall_thickness = 0;   // m, the thinnest wall of the solid
   std::optional<Tilt> tilt;
   /// m/s, container frame: the surface runs like a belt while the container stays in its place.
   Vec3 surface_velocity = Vec3::Zero();
+  std::optional<Translation> translation = std::nullopt;
 };
 
 /// A ball, or a rod along one axis.

@@ -109,19 +109,16 @@ class Checks {
             to_text(c.wall_thickness),
             ">= wall_layers · dx = " + to_text(layers) + "; the layers would leave the solid");
     if (c.tilt) tilt(c, key + ".tilt");
+    if (c.translation) translation(c, key + ".translation");
     if (const auto* boxes = std::get_if<BoxShape>(&c.shape)) spans_periods(c, *boxes, key);
     inside_domain(c, key);
   }
 
   void tilt(const Container& c, const std::string& key) {
-    require(!c.tilt->keys.empty(), key + ".keys", "[]", "at least one key");
-    for (std::size_t k = 0; k < c.tilt->keys.size(); ++k) {
-      const TiltKey& now = c.tilt->keys[k];
-      require(std::isfinite(now.time) && std::isfinite(now.angle), key + "." + at("keys", k),
-              to_text(now.time) + ", " + to_text(now.angle), "finite numbers");
-      require(k == 0 || now.time > c.tilt->keys[k - 1].time, key + "." + at("keys", k) + ".time",
-              to_text(now.time), "later than the key before it");
-    }
+    schedule(c.tilt->keys, key, [](const TiltKey& k) { return Vec3(k.angle, 0, 0); });
+    require(std::isfinite(c.tilt->rate), key + ".rate", to_text(c.tilt->rate), "a finite number");
+    if (c.tilt->oscillation)
+      oscillation(*c.tilt->oscillation, Vec3(c.tilt->oscillation->amplitude, 0, 0), key);
     require(std::abs(c.tilt->axis.norm() - 1) < 1e-6, key + ".axis", point_text(c.tilt->axis),
             "a unit vector");
     const Vec3& pivot = c.tilt->pivot;
@@ -131,6 +128,42 @@ class Checks {
     for (int a = 0; a < 3; ++a)
       require(!periodic(a), key, "tilts",
               "no tilt, because the domain is periodic along " + axis_name(a));
+  }
+
+  void translation(const Container& c, const std::string& key) {
+    const Translation& t = *c.translation;
+    schedule(t.keys, key, [](const TranslationKey& k) { return k.offset; });
+    require(t.velocity.allFinite(), key + ".velocity", point_text(t.velocity), "finite numbers");
+    if (t.oscillation) oscillation(*t.oscillation, t.oscillation->amplitude, key);
+    if (!std::holds_alternative<BoxShape>(c.shape)) return;
+    for (int a = 0; a < 3; ++a) {
+      bool along = t.velocity[a] != 0 || (t.oscillation && t.oscillation->amplitude[a] != 0);
+      for (const auto& k : t.keys) along = along || k.offset[a] != 0;
+      require(!(periodic(a) && along), key, "along " + axis_name(a),
+              "no translation along " + axis_name(a) + ", because " + c.name +
+                  " spans the domain's period there; surface_velocity lets its surface run");
+    }
+  }
+
+  /// \param value  (key) → what is finite
+  template <class Key, class Value>
+  void schedule(const std::vector<Key>& keys, const std::string& key, Value value) {
+    require(!keys.empty(), key + ".keys", "[]", "at least one key");
+    for (std::size_t k = 0; k < keys.size(); ++k) {
+      const std::string here = key + "." + at("keys", k);
+      require(std::isfinite(keys[k].time) && value(keys[k]).allFinite(), here,
+              to_text(keys[k].time), "finite numbers");
+      require(k == 0 || keys[k].time > keys[k - 1].time, here + ".time", to_text(keys[k].time),
+              "later than the key before it");
+    }
+  }
+
+  template <class Value>
+  void oscillation(const Oscillation<Value>& o, const Vec3& amplitude, const std::string& key) {
+    require(amplitude.allFinite() && std::isfinite(o.phase), key + ".oscillation",
+            point_text(amplitude), "finite numbers");
+    require(o.frequency > 0 && std::isfinite(o.frequency), key + ".oscillation.frequency",
+            to_text(o.frequency), "> 0, Hz");
   }
 
   /// Along a periodic axis every box of a union, its cavity too, goes from end to end.
@@ -156,7 +189,8 @@ class Checks {
 
   void inside_domain(const Container& c, const std::string& key) {
     const auto rings = solid_rings(c);
-    const std::string place = key + (c.tilt ? ".tilt" : ".origin");
+    const std::string place =
+        key + (c.tilt ? ".tilt" : c.translation ? ".translation" : ".origin");
     const auto reach = [&](const Vec3& direction) {
       return farthest_along(direction, rings, &c, scene_.schedule.end);
     };

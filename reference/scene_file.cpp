@@ -87,29 +87,79 @@ Contact read_contact(const JsonValue& v) {
   return contact;
 }
 
+/// A direction as a unit vector.
+Vec3 read_axis(const JsonValue& v) {
+  const Vec3 axis = v.vector(coordinate);
+  const double length = axis.norm();
+  if (!(length > 1e-6)) v.refuse("a direction longer than 1e-6; it need not be a unit");
+  // An axis that is a unit to rounding stays in its bits, so that a written scene reads back equal.
+  return std::abs(length - 1.0) > 1e-14 ? Vec3(axis / length) : axis;
+}
+
+/// The time of a key, later than `before` where that has one.
+template <class Key>
+double read_key_time(const JsonValue& key, const std::vector<Key>& before) {
+  const double time = key["time"].number(non_negative);
+  if (!before.empty() && !(time > before.back().time))
+    key["time"].refuse("later than the key before it, at " + to_text(before.back().time));
+  return time;
+}
+
+/// \param read  (amplitude's value) → amplitude
+template <class Value, class Read>
+Oscillation<Value> read_oscillation(const JsonValue& v, const std::string& keys, Read read) {
+  v.check_keys(keys_of(keys));
+  return {read(v["amplitude"]), v["frequency"].number(positive),
+          v.has("phase") ? v["phase"].number({.low = -1e3, .high = 1e3}) : 0.0};
+}
+
 Tilt read_tilt(const JsonValue& v) {
   v.check_keys(keys_of("tilt"));
-  Tilt tilt;
-  tilt.pivot = v["pivot"].vector(coordinate);
-  tilt.axis = v["axis"].vector(coordinate);
-  const double length = tilt.axis.norm();
-  if (!(length > 1e-6)) v["axis"].refuse("a direction longer than 1e-6; it need not be a unit");
-  // An axis that is a unit to rounding stays in its bits, so that a written scene reads back equal.
-  if (std::abs(length - 1.0) > 1e-14) tilt.axis /= length;
-  for (const auto& key : v["keys"].elements(1, 10000)) {
-    key.check_keys(keys_of("tilt_key"));
-    if (key.has("angle") == key.has("angle_deg"))
-      key.refuse("exactly one of angle (rad) and angle_deg");
-    const double time = key["time"].number(non_negative);
-    if (!tilt.keys.empty() && !(time > tilt.keys.back().time))
-      key["time"].refuse("later than the key before it, at " + to_text(tilt.keys.back().time));
-    constexpr double degree = std::numbers::pi / 180.0;
-    const double angle = key.has("angle")
-                             ? key["angle"].number({.low = -7.0, .high = 7.0})
-                             : key["angle_deg"].number({.low = -360.0, .high = 360.0}) * degree;
-    tilt.keys.push_back({time, angle});
-  }
+  // A double has an angle of 1e6 rad within 1e-10.
+  const Range turns{.low = -1e6, .high = 1e6};
+  Tilt tilt{v["pivot"].vector(coordinate), read_axis(v["axis"]), {}};
+  if (v.has("keys") + v.has("rate") + v.has("oscillation") == 0)
+    v.refuse("at least one of keys, rate, oscillation");
+  if (v.has("keys"))
+    for (const auto& key : v["keys"].elements(1, 10000)) {
+      key.check_keys(keys_of("tilt_key"));
+      if (key.has("angle") == key.has("angle_deg"))
+        key.refuse("exactly one of angle (rad) and angle_deg");
+      const double time = read_key_time(key, tilt.keys);
+      constexpr double degree = std::numbers::pi / 180.0;
+      const double angle =
+          key.has("angle") ? key["angle"].number(turns) : key["angle_deg"].number(turns) * degree;
+      tilt.keys.push_back({time, angle});
+    }
+  else
+    tilt.keys = {{0.0, 0.0}};
+  if (v.has("rate")) tilt.rate = v["rate"].number(turns);
+  if (v.has("oscillation"))
+    tilt.oscillation =
+        read_oscillation<double>(v["oscillation"], "tilt_oscillation",
+                                 [&](const JsonValue& amplitude) { return amplitude.number(turns); });
   return tilt;
+}
+
+Translation read_translation(const JsonValue& v) {
+  v.check_keys(keys_of("translation"));
+  if (v.has("keys") + v.has("velocity") + v.has("oscillation") == 0)
+    v.refuse("at least one of keys, velocity, oscillation");
+  Translation translation;
+  if (v.has("keys")) {
+    translation.keys.clear();
+    for (const auto& key : v["keys"].elements(1, 10000)) {
+      key.check_keys(keys_of("translation_key"));
+      const double time = read_key_time(key, translation.keys);
+      translation.keys.push_back({time, key["offset"].vector(coordinate)});
+    }
+  }
+  if (v.has("velocity")) translation.velocity = v["velocity"].vector(speed);
+  if (v.has("oscillation"))
+    translation.oscillation = read_oscillation<Vec3>(
+        v["oscillation"], "translation_oscillation",
+        [](const JsonValue& amplitude) { return amplitude.vector(coordinate); });
+  return translation;
 }
 
 double cross(const std::array<double, 2>& o, const std::array<double, 2>& a,
@@ -219,6 +269,7 @@ Container read_container(const JsonValue& v, const Domain& domain) {
     container.shape = std::move(shape);
   }
   if (v.has("tilt")) container.tilt = read_tilt(v["tilt"]);
+  if (v.has("translation")) container.translation = read_translation(v["translation"]);
   if (v.has("surface_velocity")) container.surface_velocity = v["surface_velocity"].vector(speed);
   return container;
 }
@@ -313,14 +364,20 @@ const std::vector<ObjectKeys>& scene_file_keys() {
       {"domain", {"min", "max"}, {"periodic"}},
       {"floor", {"height"}, {}},
       {"contact", {}, {"distance_ratio", "restitution", "friction"}},
-      {"container", {"name"}, {"cup", "tank", "revolved", "boxes", "origin", "tilt", "surface_velocity"}},
+      {"container",
+       {"name"},
+       {"cup", "tank", "revolved", "boxes", "origin", "tilt", "translation", "surface_velocity"}},
       {"cup", {"inner_radius", "inner_height", "wall_thickness"}, {}},
       {"tank", {"size", "wall_thickness"}, {"open"}},
       {"revolved", {"profile", "wall_thickness"}, {}},
       {"boxes", {"cavity", "solid", "wall_thickness"}, {}},
       {"box", {"min", "max"}, {}},
-      {"tilt", {"pivot", "axis", "keys"}, {}},
+      {"tilt", {"pivot", "axis"}, {"keys", "rate", "oscillation"}},
       {"tilt_key", {"time"}, {"angle", "angle_deg"}},
+      {"tilt_oscillation", {"amplitude", "frequency"}, {"phase"}},
+      {"translation", {}, {"keys", "velocity", "oscillation"}},
+      {"translation_key", {"time", "offset"}, {}},
+      {"translation_oscillation", {"amplitude", "frequency"}, {"phase"}},
       {"fill",
        {},
        {"container", "level", "box", "ball", "rod", "around", "velocity", "velocity_gradient"}},

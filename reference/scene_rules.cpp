@@ -88,7 +88,10 @@ double expected_max_speed(const Scene& scene) {
     const auto rings = fill_rings(fill, container);
     double start = fastest_start(fill, rings, container);
     if (container) start = std::max(start, fastest_point(rings, *container));
-    for (const auto& c : scene.containers) start = std::max(start, c.surface_velocity.norm());
+    for (const auto& c : scene.containers) {
+      start = std::max(start, c.surface_velocity.norm());
+      if (&c != container) start = std::max(start, fastest_point(solid_rings(c), c));
+    }
     double fall = 0;
     if (gravity > 0)
       fall = std::max(0.0, farthest_along(up, rings, container, scene.schedule.end) - caught);

@@ -1,8 +1,9 @@
 /// \file
-/// Sampling of the tilt with bounds on what lies between the samples.
+/// Sampling of tilt and translation with bounds on what lies between the samples.
 #include "reference/sweep.hpp"
 
 #include "reference/distance.hpp"
+#include "reference/motion_bounds.hpp"
 #include "reference/pose.hpp"
 #include "reference/shapes.hpp"
 
@@ -16,8 +17,9 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-double distance_to_line(const Tilt& tilt, const Vec3& world) {
-  return tilt.axis.cross(world - tilt.pivot).norm();
+/// \param line  a point of the tilt's line, world
+double distance_to_line(const Tilt& tilt, const Vec3& line, const Vec3& world) {
+  return tilt.axis.cross(world - line).norm();
 }
 
 std::vector<Ring> corners(const SolidBox& box) {
@@ -29,19 +31,13 @@ std::vector<Ring> corners(const SolidBox& box) {
   return rings;
 }
 
-/// Times from 0 to `end` between which the tilt's angle is monotone.
-std::vector<double> break_times(const Container& container, double end) {
-  std::vector<double> times = {0.0, end};
-  if (container.tilt)
-    for (const auto& key : container.tilt->keys)
-      if (key.time > 0 && key.time < end) times.push_back(key.time);
-  return times;
-}
-
-/// The container turned by `angle` (rad), for good.
+/// The container turned by `angle` (rad), for good, and not translated.
 Pose pose_turned(const Container& container, double angle) {
   Container turned = container;
   turned.tilt->keys = {{0.0, angle}};
+  turned.tilt->rate = 0;
+  turned.tilt->oscillation.reset();
+  turned.translation.reset();
   return pose_at(turned, 0.0);
 }
 
@@ -78,12 +74,17 @@ std::vector<Patch> surface_patches(const std::vector<ProfileEdge>& edges,
   return patches;
 }
 
-/// Largest turn away from the angle at `middle`, between two times with a monotone angle, rad.
-double turn_between(const Container& container, double from, double middle, double to) {
-  if (!container.tilt) return 0.0;
-  const double at = tilt_at(*container.tilt, middle).angle;
-  return std::max(std::abs(tilt_at(*container.tilt, from).angle - at),
-                  std::abs(tilt_at(*container.tilt, to).angle - at));
+/// A bound of the way that a point within `radius` of `world` goes, carried with the container, from
+/// the middle of `from` … `to` to any time between them. It can go no farther than round its circle.
+double way_between(const Container& container, const Pose& pose, double from, double to,
+                   const Vec3& world, double radius) {
+  const double half = 0.5 * (to - from);
+  double way = 0;
+  if (container.tilt)
+    way += std::min(2.0, greatest_rate(*container.tilt, from, to) * half) *
+           (distance_to_line(*container.tilt, pose.pivot, world) + radius);
+  if (container.translation) way += greatest_speed(*container.translation, from, to) * half;
+  return way;
 }
 
 /// Improves `best` with the surface of `a` against the solid of `b`.
@@ -98,11 +99,12 @@ void approach_one_way(const Container& a, const Container& b, double end, double
     Patch patch;
     double from, to;
   };
-  std::vector<double> times = break_times(a, end);
-  for (double t : break_times(b, end)) times.push_back(t);
+  end = until_repetition({&a, &b}, end);
+  std::vector<double> times = key_times(a, end);
+  for (double t : key_times(b, end)) times.push_back(t);
   std::sort(times.begin(), times.end());
   times.erase(std::unique(times.begin(), times.end()), times.end());
-  if (!a.tilt && !b.tilt) times = {0.0, 0.0};
+  if (times.size() == 1) times = {0.0, 0.0};  // nothing moves
   std::vector<Piece> pieces;
   for (std::size_t k = 0; k + 1 < times.size(); ++k)
     for (const auto& patch : surface_patches(edges, faces))
@@ -112,18 +114,14 @@ void approach_one_way(const Container& a, const Container& b, double end, double
     const Piece piece = pieces.back();
     pieces.pop_back();
     const double middle = 0.5 * (piece.from + piece.to);
-    const Vec3 world = pose_at(a, middle).to_world(piece.patch.middle());
-    const double distance = solid.at(pose_at(b, middle).to_local(world)).distance;
+    const Pose pose_a = pose_at(a, middle), pose_b = pose_at(b, middle);
+    const Vec3 world = pose_a.to_world(piece.patch.middle());
+    const double distance = solid.at(pose_b.to_local(world)).distance;
     if (distance < best.distance) best = {distance, middle, world};
 
     const Vec3 half = piece.patch.half_lengths();
-    double way = 0;
-    if (a.tilt)
-      way = turn_between(a, piece.from, middle, piece.to) *
-            (distance_to_line(*a.tilt, world) + half.norm());
-    if (b.tilt)
-      way += turn_between(b, piece.from, middle, piece.to) *
-             (distance_to_line(*b.tilt, world) + half.norm() + way);
+    double way = way_between(a, pose_a, piece.from, piece.to, world, half.norm());
+    way += way_between(b, pose_b, piece.from, piece.to, world, half.norm() + way);
     if (distance - half.norm() - way >= std::min(enough, best.distance) - slack) continue;
 
     Piece lower = piece, upper = piece;
@@ -189,33 +187,36 @@ double farthest_along(const Vec3& direction, const std::vector<Ring>& rings,
     return farthest;
   };
   if (!container) return at_pose(Pose{});
-  if (!container->tilt) return at_pose(pose_at(*container, 0.0));
-  double low = infinity, high = -infinity;
-  for (double t : break_times(*container, end)) {
-    const double angle = tilt_at(*container->tilt, t).angle;
-    low = std::min(low, angle);
-    high = std::max(high, angle);
+  const double along = container->translation
+                           ? farthest_offset(*container->translation, direction, end)
+                           : 0.0;
+  if (!container->tilt) {
+    Container still = *container;
+    still.translation.reset();
+    return at_pose(pose_at(still, 0.0)) + along;
   }
-  const int steps = std::max(1, static_cast<int>(std::ceil((high - low) / 0.01)));
+  AngleRange range = angle_range(*container->tilt, end);
+  range.high = std::min(range.high, range.low + 2 * std::numbers::pi);
+  const int steps = std::max(1, static_cast<int>(std::ceil((range.high - range.low) / 0.01)));
   double farthest = -infinity;
   for (int k = 0; k <= steps; ++k)
-    farthest = std::max(farthest, at_pose(pose_turned(*container, low + (high - low) * k / steps)));
-  return farthest;
+    farthest = std::max(
+        farthest,
+        at_pose(pose_turned(*container, range.low + (range.high - range.low) * k / steps)));
+  return farthest + along;
 }
 
 double fastest_point(const std::vector<Ring>& rings, const Container& container) {
-  if (!container.tilt) return 0.0;
-  const auto& keys = container.tilt->keys;
-  double rate = 0;
-  for (std::size_t k = 1; k < keys.size(); ++k)
-    rate = std::max(rate, 1.5 * std::abs(keys[k].angle - keys[k - 1].angle) /
-                              (keys[k].time - keys[k - 1].time));
+  double speed = 0;
+  if (container.translation) speed = greatest_speed(*container.translation, 0.0, infinity);
+  if (!container.tilt) return speed;
   const Pose pose = pose_turned(container, 0.0);
   double farthest = 0;
   for (const auto& ring : rings)
-    farthest = std::max(
-        farthest, distance_to_line(*container.tilt, pose.to_world(ring.center)) + ring.radius);
-  return rate * farthest;
+    farthest = std::max(farthest, distance_to_line(*container.tilt, container.tilt->pivot,
+                                                   pose.to_world(ring.center)) +
+                                      ring.radius);
+  return speed + greatest_rate(*container.tilt, 0.0, infinity) * farthest;
 }
 
 Approach closest_approach(const Container& a, const Container& b, double end, double enough,

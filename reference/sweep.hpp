@@ -1,5 +1,5 @@
 /// \file
-/// Where containers and their fluid get to over a tilt: extremes along a direction, the closest
+/// Where containers and their fluid get to while they tilt and translate: extremes along a direction, the closest
 /// approach of two containers, and the room inside a revolved shape.
 #pragma once
 
@@ -30,12 +30,13 @@ std::vector<Ring> cavity_bottom_rings(const Container& container);
 ///
 /// Angles are sampled 0.01 rad apart or closer. Each point of a ring follows a sinusoid in the
 /// angle whose amplitude is at most its distance from the tilt's line, rho, so the result falls
-/// short of the true one by at most rho · 0.01² / 8 (1 µm at 80 mm). \param direction  unit vector,
-/// world
+/// short of the true one by at most rho · 0.01² / 8 (1 µm at 80 mm). The farthest offset is added to
+/// the farthest turn: a bound where a container does both. \param direction  unit vector, world
 double farthest_along(const Vec3& direction, const std::vector<Ring>& rings,
                       const Container* container, double end);
 
-/// Greatest speed of the rings over the whole tilt, m/s, from the steepest slope of its smoothstep.
+/// A bound of the rings' speed over the whole motion, m/s, from the steepest slopes of its schedules;
+/// exact where the container only tilts or only translates between keys.
 double fastest_point(const std::vector<Ring>& rings, const Container& container);
 
 struct Approach {
@@ -50,7 +51,7 @@ struct Approach {
 ///
 /// Branch and bound over pieces of surface and of time. A piece's middle is a true surface point at
 /// a true time; no point of the piece at any of its times is nearer to the other solid by more than
-/// the piece's radius plus the way both containers turn. So a gap below `enough` − `slack` cannot
+/// the piece's radius plus the way both containers go. So a gap below `enough` − `slack` cannot
 /// be missed, and none of `enough` or more is refused.
 Approach closest_approach(const Container& a, const Container& b, double end, double enough,
                           double slack);

@@ -1,5 +1,5 @@
 /// \file
-/// The tilt schedule and the rigid motion that follows from it.
+/// The schedules of tilt and translation and the rigid motion that follows from them.
 #include "reference/pose.hpp"
 #include "reference/shapes.hpp"
 #include "reference/solver.hpp"
@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numbers>
 
 namespace decant::test {
@@ -67,6 +68,103 @@ TEST(TiltAngle, HasARateThatIsItsDerivative) {
   }));
 }
 
+/// Anything that a schedule may say.
+Tilt any_tilt() {
+  Tilt tilt{vec(-1, 1), vec(0.1, 1).normalized(), {}};
+  const int keys = integer(1, 5);
+  for (int k = 0; k < keys; ++k) tilt.keys.push_back({k + real(0, 0.8), real(-3, 3)});
+  if (coin()) tilt.rate = real(-9, 9);
+  if (coin()) tilt.oscillation = {real(-1, 1), real(0.1, 2), real(-4, 4)};
+  return tilt;
+}
+
+Translation any_translation() {
+  Translation translation;
+  translation.keys.clear();
+  const int keys = integer(1, 5);
+  for (int k = 0; k < keys; ++k) translation.keys.push_back({k + real(0, 0.8), vec(-3, 3)});
+  if (coin()) translation.velocity = vec(-9, 9);
+  if (coin()) translation.oscillation = {vec(-1, 1), real(0.1, 2), real(-4, 4)};
+  return translation;
+}
+
+/// Whether t is a time at which a schedule of one key starts at once.
+template <class Key>
+bool starts_at(const std::vector<Key>& keys, double t, double d) {
+  return keys.size() == 1 && std::abs(t - keys[0].time) <= d;
+}
+
+TEST(Schedules, HaveRatesThatAreTheirDerivativesWhateverTheySay) {
+  EXPECT_TRUE(rc::check("rate == d value / dt", [] {
+    const Tilt tilt = any_tilt();
+    const Translation translation = any_translation();
+    const double t = real(-1, 7), d = 1e-5;
+    // A kink of |turn|·6/span² at a key, 3 |rate|/span more where the rate goes on.
+    if (!starts_at(tilt.keys, t, d)) {
+      const double slope = (tilt_at(tilt, t + d).angle - tilt_at(tilt, t - d).angle) / (2 * d);
+      RC_ASSERT(std::abs(tilt_at(tilt, t).rate - slope) <= 1200 * d);
+    }
+    if (!starts_at(translation.keys, t, d)) {
+      const Vec3 slope = (translation_at(translation, t + d).offset -
+                          translation_at(translation, t - d).offset) / (2 * d);
+      RC_ASSERT((translation_at(translation, t).velocity - slope).norm() <= 2400 * d);
+    }
+  }));
+}
+
+TEST(Schedules, MeetTheRateAfterTheLastKeyWithoutAJump) {
+  const Tilt tilt{Vec3::Zero(), Vec3::UnitX(), {{0, 0.0}, {1, 0.5}, {3, 2.5}}, 4};
+  EXPECT_EQ(tilt_at(tilt, 3).rate, 4);
+  EXPECT_NEAR(tilt_at(tilt, 3 - 1e-9).rate, 4, 1e-7);
+  EXPECT_NEAR(tilt_at(tilt, 1 + 1e-9).rate, 0, 1e-7);
+  // Halfway: 1/2 of the turn and rate · T (1/8 − 1/4); 3/2 of the mean rate and rate (3/4 − 1).
+  EXPECT_NEAR(tilt_at(tilt, 2).angle, 0.5 + 2.0 / 2 - 4.0 * 2 / 8, 1e-15);
+  EXPECT_NEAR(tilt_at(tilt, 2).rate, 1.5 * 2 / 2 - 4.0 / 4, 1e-15);
+  // The span before the last ends at rest.
+  EXPECT_NEAR(tilt_at(tilt, 0.5).rate, 1.5 * 0.5, 1e-15);
+  EXPECT_EQ(tilt_at(tilt, 10).angle, 2.5 + 4 * 7);
+}
+
+TEST(Schedules, AddAnOscillationToWhatTheKeysSay) {
+  Translation sway;
+  sway.keys = {{0, Vec3(1, 0, 0)}, {2, Vec3(1, 2, 0)}};
+  sway.oscillation = {Vec3(0, 0.5, 0.1), 0.25, std::numbers::pi / 2};
+  // A quarter of a period on, a cosine is at 0 and falls; the keys are halfway.
+  const TranslationOffset at = translation_at(sway, 1);
+  EXPECT_LT((at.offset - Vec3(1, 1, 0)).norm(), 1e-15);
+  EXPECT_LT((at.velocity - Vec3(0, 1.5, 0) + std::numbers::pi / 2 * Vec3(0, 0.5, 0.1)).norm(), 1e-15);
+}
+
+TEST(Pose, OfADrumAfterManyTurnsIsThatOfTheAngleThatRemains) {
+  Container drum = tilting_cup();
+  drum.tilt->keys = {{0.0, 0.25}};
+  drum.tilt->rate = 3;
+  const long double turn = 2 * std::numbers::pi_v<long double>;
+  for (const double t : {1.0, 100.0, 1e4, 1e5}) {
+    const double angle = 0.25 + 3 * t;
+    const auto rest = static_cast<double>(std::remainder(static_cast<long double>(angle), turn));
+    const Pose pose = pose_at(drum, t);
+    const Eigen::Matrix3d turned = Eigen::AngleAxisd(rest, drum.tilt->axis).toRotationMatrix();
+    EXPECT_LT((pose.rotation - turned).norm(), 1e-14) << t;
+    EXPECT_LT((pose.angular_velocity - 3 * drum.tilt->axis).norm(), 1e-15) << t;
+  }
+}
+
+TEST(Pose, TakesTheLineOfTheTiltAlong) {
+  Container cup = tilting_cup();
+  cup.translation.emplace().velocity = {1, -2, 0.5};
+  const Pose still = pose_at(tilting_cup(), 1.2), pose = pose_at(cup, 1.2);
+  const Vec3 way = 1.2 * cup.translation->velocity;
+  EXPECT_EQ(pose.rotation, still.rotation);
+  EXPECT_LT((pose.pivot - still.pivot - way).norm(), 1e-15);
+  EXPECT_LT((pose.translation - still.translation - way).norm(), 1e-15);
+  EXPECT_EQ(pose.linear_velocity, cup.translation->velocity);
+  EXPECT_TRUE(moves(cup));
+  cup.tilt.reset();
+  EXPECT_TRUE(moves(cup));
+  EXPECT_EQ(pose_at(cup, 1.2).velocity_at(Vec3(5, 6, 7)), cup.translation->velocity);
+}
+
 TEST(Pose, TurnsRightHandedAboutThePivot) {
   Container cup = tilting_cup();
   cup.tilt = Tilt{Vec3(1, 0, 1), Vec3::UnitY(), {{0, std::numbers::pi / 2}}};
@@ -115,16 +213,29 @@ TEST(Pose, IsUprightWhereTheAngleIsZero) {
 
 TEST(PosedWalls, MoveWithTheDerivativeOfTheirPosition) {
   Scene scene = open_scene();
-  scene.containers = {tilting_cup(), tilting_cup()};
+  Container sway = tilting_cup(), both = tilting_cup();
+  sway.tilt.reset();
+  sway.translation.emplace().oscillation = {Vec3(0.1, 0, 0.02), 1.5, 0.3};
+  both.tilt->rate = 5;
+  both.tilt->oscillation = {0.2, 1.1, 0};
+  both.translation.emplace().keys = {{0.5, Vec3::Zero()}, {2.5, Vec3(0.3, 0.1, -0.2)}};
+  both.translation->velocity = {0.2, 0, 0};
+  scene.containers = {tilting_cup(), tilting_cup(), sway, both};
   scene.containers[1].tilt.reset();
-  const Walls walls{{{cloud(1, 20, -0.1, 0.1)}, {cloud(2, 5, -0.1, 0.1)}}};
-  for (const double t : {0.2, 0.7, 1.1, 1.8, 2.3, 2.9}) {
-    const double d = 1e-6;
-    const PosedWalls before = pose_walls(scene, walls, t - d), now = pose_walls(scene, walls, t),
-                     after = pose_walls(scene, walls, t + d);
-    const Eigen::Matrix3Xd slope = (after.position - before.position) / (2 * d);
-    EXPECT_LT((now.velocity - slope).norm(), 1e-8) << t;
-    EXPECT_EQ(now.velocity.rightCols(5).norm(), 0);
+  const Walls walls{{{cloud(1, 20, -0.1, 0.1)},
+                     {cloud(2, 5, -0.1, 0.1)},
+                     {cloud(3, 9, -0.1, 0.1)},
+                     {cloud(4, 9, -0.1, 0.1)}}};
+  for (const double t : {0.2, 0.7, 1.1, 1.8, 2.3, 2.9, 5.3}) {
+    // Of fourth order, so that 1e-9 is beyond both the formula's error and rounding.
+    const double d = 3e-4;
+    const auto at = [&](double time) { return pose_walls(scene, walls, time).position; };
+    const Eigen::Matrix3Xd slope =
+        (8 * (at(t + d) - at(t - d)) - (at(t + 2 * d) - at(t - 2 * d))) / (12 * d);
+    const PosedWalls now = pose_walls(scene, walls, t);
+    EXPECT_LT((now.velocity - slope).colwise().norm().maxCoeff(), 1e-9) << t;
+    EXPECT_EQ(now.velocity.middleCols(20, 5).norm(), 0);
+    EXPECT_GT(now.velocity.rightCols(18).colwise().norm().minCoeff(), 0);
   }
 }
 

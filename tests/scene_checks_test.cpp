@@ -49,6 +49,12 @@ Container cup_at(const Vec3& origin) {
   return {"third", cup_shape(0.02, 0.03, 0.009), origin, 0.009, {}};
 }
 
+/// A blade of 12 × 20 × 30 mm from `origin` on.
+Container blade_at(const Vec3& origin) {
+  const SolidBox box{Vec3::Zero(), Vec3(0.012, 0.02, 0.03)};
+  return {"blade", BoxShape{box, {box}}, origin, 0.012, {}};
+}
+
 /// A sound scene made wrong: the refusal names `key`, and value and bound hold the texts.
 struct Unsound {
   const char* what;
@@ -116,6 +122,64 @@ const Unsound unsound[] = {
        s.containers[0].tilt = Tilt{Vec3::Zero(), Vec3::UnitX(), {{0, 0}, {1, 1}}};
      },
      "containers[0].tilt", "tilts", "the domain is periodic along x"},
+    {"TranslationAlongThePeriodThatIsSpanned", channel,
+     [](Scene& s) { s.containers[0].translation.emplace().velocity = {0, 0.1, 0}; },
+     "containers[0].translation", "along y", "spans the domain's period"},
+    {"TranslationKeysOutOfOrder", pour,
+     [](Scene& s) {
+       s.containers[1].translation.emplace().keys = {{1, Vec3::Zero()}, {1, Vec3::Zero()}};
+     },
+     "containers[1].translation.keys[1].time", "1.0", "later than the key before it"},
+    {"TranslationThatIsNoNumber", pour,
+     [](Scene& s) { s.containers[1].translation.emplace().keys[0].offset.y() = nan; },
+     "containers[1].translation.keys[0]", "0.0", "finite numbers"},
+    {"OscillationWithoutAFrequency", pour,
+     [](Scene& s) { s.containers[0].tilt->oscillation = {0.01, 0}; },
+     "containers[0].tilt.oscillation.frequency", "0.0", "> 0"},
+    {"TranslationLeavesDomain", pour,
+     [](Scene& s) { s.containers[1].translation.emplace().velocity = {0, 0.2, 0}; },
+     // 59 mm of it lie in front, and 0.2 m/s · 3.4 s.
+     "containers[1].translation", "receiver reaches y = 0.739", "<= 0.5, the domain's end"},
+    {"SwayReachesBelowFloor", pour,
+     [](Scene& s) {
+       s.containers[1].translation.emplace().oscillation = {Vec3(0, 0, 0.001), 2};
+     },
+     "containers[1].translation", "receiver reaches z = -0.001", ">= 0.0, the floor's height"},
+    {"CupsMeetInASway", pour,
+     [](Scene& s) {
+       s.containers[1].translation.emplace().oscillation = {Vec3(0.002, 0, 0), 5};
+     },
+     "containers[1]", "receiver and source are 0.007", "apart by >= H = 0.0077"},
+    {"MixerMeetsItsNeighborLateInItsTurn", pour,
+     [](Scene& s) {
+       // Round a line above it; it comes back to where it began from the other side.
+       s.containers[0].tilt =
+           Tilt{s.containers[0].origin + Vec3(0, 0, 0.12), Vec3::UnitY(), {{0, 0}}, 2};
+     },
+     "containers[1]", "receiver and source overlap by", "at all times"},
+    {"PistonTheFluidCannotFollow", dam,
+     [](Scene& s) {
+       s.domain.min.x() = -1;
+       s.containers[0].translation.emplace().keys = {{0, Vec3::Zero()}, {0.1, Vec3(-0.5, 0, 0)}};
+     },
+     // 3/2 of the mean speed, 5 m/s, at halfway.
+     "fluid.sound_speed", "", "where the speed to expect is 7.65"},
+    {"FillThroughABlade", dam,
+     [](Scene& s) { s.containers.push_back(blade_at({0.02, 0.015, 0.03})); },
+     "fill[0]", "a particle at (", "a fill leaves room for what its `around` names"},
+    {"FillAroundItsOwnContainer", dam,
+     [](Scene& s) { s.fills[0].around = {"tank"}; }, "fill[0].around", "tank",
+     "the name of another container"},
+    {"FillAroundNothingKnown", dam,
+     [](Scene& s) { s.fills[0].around = {"gate"}; }, "fill[0].around", "gate",
+     "the name of another container"},
+    {"FillAroundABladeThatHitsTheTank", dam,
+     [](Scene& s) {
+       s.containers.push_back(blade_at({0.02, 0.015, 0.03}));
+       s.containers[1].translation.emplace().keys = {{0, Vec3::Zero()}, {0.1, Vec3(0, 0, -0.025)}};
+       s.fills[0].around = {"blade"};
+     },
+     "containers[1]", "blade and tank", "at all times"},
     {"CupAtAPeriodicBoundary", pour,
      [](Scene& s) {
        s.containers[0].tilt.reset();
@@ -307,8 +371,8 @@ double sampled_approach(const Container& a, const Container& b, double end, doub
   const Eigen::Matrix3Xd vertex = render_surface(a, spacing).vertex;
   const SolidDistance solid(b);
   double least = std::numeric_limits<double>::infinity();
-  for (int k = 0; k <= 100; ++k) {
-    const Pose pose_a = pose_at(a, end * k / 100), pose_b = pose_at(b, end * k / 100);
+  for (int k = 0; k <= 250; ++k) {
+    const Pose pose_a = pose_at(a, end * k / 250), pose_b = pose_at(b, end * k / 250);
     for (Eigen::Index i = 0; i < vertex.cols(); ++i)
       least = std::min(least, solid.at(pose_b.to_local(pose_a.to_world(vertex.col(i)))).distance);
   }
@@ -324,11 +388,21 @@ TEST(ClosestApproach, IsNeverMoreThanItsSlackAboveWhatSamplingFinds) {
     Container b = cup_at({0.05, 0, 0.05});
     if (*rc::gen::arbitrary<bool>())
       b.shape = tank_shape({0.05, 0.03, 0.04}, 0.01, {{{true, false}, {}, {}}});
-    for (Container* c : {&a, &b})
-      if (*rc::gen::arbitrary<bool>())
+    const auto coin = [] { return *rc::gen::arbitrary<bool>(); };
+    for (Container* c : {&a, &b}) {
+      if (coin()) {
         c->tilt = Tilt{{real(-0.1, 0.1), 0, 0.05},
                        Vec3(real(0, 1), 1, 0).normalized(),
                        {{0.1, real(-1, 1)}, {0.5, real(-3, 3)}, {1.2, real(-3, 3)}}};
+        if (coin()) c->tilt->keys.resize(1), c->tilt->rate = real(-8, 8);
+      }
+      if (coin()) {
+        auto& t = c->translation.emplace();
+        if (coin()) t.keys.push_back({real(0.2, 0.8), {real(-0.1, 0.1), real(-0.1, 0.1), 0}});
+        if (coin()) t.velocity = {0, real(-0.1, 0.1), real(-0.1, 0.1)};
+        if (coin()) t.oscillation = {Vec3(real(-0.05, 0.05), 0, 0.02), real(0.3, 2), real(0, 6)};
+      }
+    }
     const double slack = 1e-3, end = 1.0;
     // Sampled points are true ones, so the least distance is not above theirs; and it is not below
     // by more than their spacing and the way between two times.
@@ -355,6 +429,77 @@ TEST(FarthestAlong, IsNeverShortOfWhatDenseTimesFind) {
       }
       EXPECT_NEAR(farthest_along(direction, solid_rings(source), &source, 3.4), sampled, 1e-4);
     }
+}
+
+TEST(FarthestAlong, AndFastestPointBoundAnyMotion) {
+  EXPECT_TRUE(rc::check("never short of what dense times find", [] {
+    const auto real = [](double low, double high) {
+      return low + (high - low) * *rc::gen::inRange(0, 1001) / 1000.0;
+    };
+    const auto coin = [] { return *rc::gen::arbitrary<bool>(); };
+    Container c = cup_at({0.1, 0, 0.05});
+    if (coin()) {
+      c.tilt = Tilt{{real(-0.1, 0.1), 0, 0.05}, Vec3::UnitY(), {{0.1, real(-1, 1)}}};
+      if (coin()) c.tilt->keys.push_back({0.6, real(-3, 3)});
+      if (coin()) c.tilt->rate = real(-20, 20);
+      if (coin()) c.tilt->oscillation = {real(-1, 1), real(0.5, 3), real(0, 6)};
+    }
+    auto& t = c.translation.emplace();
+    if (coin()) t.keys.push_back({real(0.2, 1.5), {real(-1, 1), real(-1, 1), 0}});
+    if (coin()) t.velocity = {0, real(-1, 1), real(-1, 1)};
+    if (coin()) t.oscillation = {Vec3(real(-1, 1), 0, 0.2), real(0.3, 2), real(0, 6)};
+    const auto rings = solid_rings(c);
+    const double fastest = fastest_point(rings, c);
+    const Vec3 directions[] = {{0, 0.6, -0.8}, {1, 0, 0}};
+    const double farthest[] = {farthest_along(directions[0], rings, &c, 1.0),
+                               farthest_along(directions[1], rings, &c, 1.0)};
+    const Eigen::Matrix3Xd vertex = render_surface(c, 0.02).vertex;
+    for (int k = 0; k <= 200; ++k) {
+      const Pose pose = pose_at(c, 0.005 * k);
+      for (Eigen::Index i = 0; i < vertex.cols(); ++i) {
+        const Vec3 x = pose.to_world(vertex.col(i));
+        RC_ASSERT(pose.velocity_at(x).norm() <= fastest * (1 + 1e-9) + 1e-12);
+        for (int d = 0; d < 2; ++d) RC_ASSERT(directions[d].dot(x) <= farthest[d] + 1e-5);
+      }
+    }
+  }));
+}
+
+TEST(FastestPoint, OfAPistonIsThreeHalvesOfItsMeanSpeed) {
+  Container piston = cup_at(Vec3::Zero());
+  piston.translation.emplace().keys = {{1, Vec3::Zero()}, {3, Vec3(0, 3, 4)}};
+  EXPECT_DOUBLE_EQ(fastest_point(solid_rings(piston), piston), 1.5 * 5 / 2);
+  piston.translation->oscillation = {Vec3(0.3, 0, 0.4), 2};
+  EXPECT_DOUBLE_EQ(fastest_point(solid_rings(piston), piston),
+                   1.5 * 5 / 2 + 2 * std::numbers::pi * 2 * 0.5);
+}
+
+TEST(ExpectedMaxSpeed, CountsWallsThatHoldNoFluid) {
+  Scene scene = dam();
+  scene.gravity.setZero();
+  EXPECT_EQ(expected_max_speed(scene), 0);
+  scene.containers.push_back(blade_at({0.2, 0.015, 0.06}));
+  scene.containers[1].translation.emplace().oscillation = {Vec3(0, 0, 0.01), 3};
+  EXPECT_DOUBLE_EQ(expected_max_speed(scene), 2 * std::numbers::pi * 3 * 0.01);
+}
+
+TEST(SceneChecks, AFillAroundABladeKeepsHalfASpacingFromIt) {
+  Scene scene = dam();
+  const auto whole = initial_state(scene).size();
+  scene.containers.push_back(blade_at({0.02, 0.015, 0.03}));
+  scene.fills[0].around = {"blade"};
+  EXPECT_NO_THROW(check_scene(scene, "dam"));
+  const ParticleState state = initial_state(scene);
+  const SolidDistance solid(scene.containers[1]);
+  const Pose pose = pose_at(scene.containers[1], 0);
+  double nearest = 1;
+  for (Eigen::Index i = 0; i < state.size(); ++i)
+    nearest = std::min(nearest, solid.at(pose.to_local(state.position.col(i))).distance);
+  EXPECT_GE(nearest, 0.4999 * scene.particle_spacing);
+  EXPECT_LT(nearest, scene.particle_spacing);
+  // What is missing fills the blade and half a spacing around it: 17 × 25 × 35 mm and a point a side.
+  EXPECT_GE(whole - state.size(), 2 * 4 * 6);
+  EXPECT_LE(whole - state.size(), 5 * 7 * 9);
 }
 
 TEST(CavityRadius, OfACupIsItsInnerRadiusAboveTheBottomAndZeroInIt) {

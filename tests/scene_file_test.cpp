@@ -170,8 +170,32 @@ const Malformed malformed[] = {
      "later than the key before it, at 0.1"},
     {"/containers/0/tilt/keys/0/time", "-1", "containers[0].tilt.keys[0].time", "-1", "[0.0, "},
     {"/containers/0/tilt/keys/0/angle", "1", "containers[0].tilt.keys[0]", "{", "exactly one of"},
-    {"/containers/0/tilt/keys/0/angle_deg", "361", "containers[0].tilt.keys[0].angle_deg", "361",
-     "[-360.0, 360.0]"},
+    {"/containers/0/tilt/keys/0/angle_deg", "1000001", "containers[0].tilt.keys[0].angle_deg",
+     "1000001", "[-1000000.0, 1000000.0]"},
+    {"/containers/0/tilt/keys", "", "containers[0].tilt", "{",
+     "at least one of keys, rate, oscillation"},
+    {"/containers/0/tilt/rate", "[1]", "containers[0].tilt.rate", "[1]", "a number in"},
+    {"/containers/0/tilt/oscillation", R"({"amplitude": 1})",
+     "containers[0].tilt.oscillation.frequency", "missing", "a required key"},
+    {"/containers/0/tilt/oscillation", R"({"amplitude": 1, "frequency": 0})",
+     "containers[0].tilt.oscillation.frequency", "0", "(0.0, "},
+    {"/containers/0/tilt/oscillation", R"({"amplitude": [1, 0, 0], "frequency": 1})",
+     "containers[0].tilt.oscillation.amplitude", "[1,0,0]", "a number in"},
+    {"/containers/0/translation", "{}", "containers[0].translation", "{}",
+     "at least one of keys, velocity, oscillation"},
+    {"/containers/0/translation", R"({"keys": [{"time": 1, "offset": [0, 0]}]})",
+     "containers[0].translation.keys[0].offset", "[0,0]", "3 elements, not 2"},
+    {"/containers/0/translation",
+     R"({"keys": [{"time": 1, "offset": [0, 0, 0]}, {"time": 1, "offset": [0, 0, 1]}]})",
+     "containers[0].translation.keys[1].time", "1", "later than the key before it, at 1.0"},
+    {"/containers/0/translation", R"({"velocity": 1})", "containers[0].translation.velocity", "1",
+     "an array"},
+    {"/containers/0/translation", R"({"oscillation": {"amplitude": 1, "frequency": 1}})",
+     "containers[0].translation.oscillation.amplitude", "1", "an array"},
+    {"/fill/0/around", "[\"cup\"]", "fill[0].around[0]", "\"cup\"", "source, tank, peg, step"},
+    {"/fill/0/around", "[\"source\"]", "fill[0].around[0]", "\"source\"",
+     "another container than the one that is filled"},
+    {"/fill/0/around", "[\"peg\", \"peg\"]", "fill[0].around[1]", "\"peg\"", "each container once"},
     {"/containers/0/surface_velocity", "[1, 0]", "containers[0].surface_velocity", "[1,0]",
      "3 elements, not 2"},
     {"/fill/1/ball", "{}", "fill[1]", "{", "exactly one of level, box, ball, rod"},
@@ -285,6 +309,17 @@ TEST(SceneFile, TakesDegreesAndRadians) {
   const auto tilt = *parse_scene(scene.dump(), "s.json").containers[0].tilt;
   EXPECT_DOUBLE_EQ(tilt.keys[0].angle, std::numbers::pi);
   EXPECT_EQ(tilt.keys[1].angle, 3.0);
+}
+
+TEST(SceneFile, ADrumNeedsNothingButItsRate) {
+  json scene = valid_scene();
+  scene["containers"][0]["tilt"] = {{"pivot", {0, 0, 0}}, {"axis", {0, 2, 0}}, {"rate", -3.5}};
+  const auto tilt = *parse_scene(scene.dump(), "s.json").containers[0].tilt;
+  ASSERT_EQ(tilt.keys.size(), 1u);
+  EXPECT_EQ(tilt.keys[0].time, 0);
+  EXPECT_EQ(tilt.keys[0].angle, 0);
+  EXPECT_EQ(tilt.rate, -3.5);
+  EXPECT_EQ(tilt.axis, Vec3::UnitY());
 }
 
 TEST(SceneFile, WallViscosityIsTwiceTheViscosityUnlessGiven) {

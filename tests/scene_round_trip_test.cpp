@@ -35,9 +35,17 @@ class Bits {
         add(boxes.cavity);
         for (const auto& box : boxes.solid) add(box);
       }
-      if (!c.tilt) continue;
-      add(c.tilt->pivot), add(c.tilt->axis);
-      for (const auto& key : c.tilt->keys) add(key.time, key.angle);
+      if (c.tilt) {
+        add(c.tilt->pivot), add(c.tilt->axis), add(c.tilt->rate);
+        for (const auto& key : c.tilt->keys) add(key.time, key.angle);
+        if (const auto& o = c.tilt->oscillation) add(o->amplitude, o->frequency, o->phase);
+      }
+      if (c.translation) {
+        add(c.translation->velocity);
+        for (const auto& key : c.translation->keys) add(key.time), add(key.offset);
+        if (const auto& o = c.translation->oscillation)
+          add(o->amplitude), add(o->frequency, o->phase);
+      }
     }
     for (const auto& fill : s.fills) {
       add(fill.level), add(fill.velocity);
@@ -80,13 +88,18 @@ bool same(const Scene& a, const Scene& b) {
   for (std::size_t i = 0; i < a.containers.size(); ++i) {
     const auto &c = a.containers[i], &d = b.containers[i];
     if (c.name != d.name || c.shape.index() != d.shape.index() ||
-        c.tilt.has_value() != d.tilt.has_value())
+        c.tilt.has_value() != d.tilt.has_value() ||
+        c.translation.has_value() != d.translation.has_value())
+      return false;
+    if (c.tilt && c.tilt->oscillation.has_value() != d.tilt->oscillation.has_value()) return false;
+    if (c.translation &&
+        c.translation->oscillation.has_value() != d.translation->oscillation.has_value())
       return false;
     const auto* boxes = std::get_if<BoxShape>(&c.shape);
     if (boxes && boxes->endless != std::get<BoxShape>(d.shape).endless) return false;
   }
   for (std::size_t i = 0; i < a.fills.size(); ++i)
-    if (a.fills[i].container != b.fills[i].container ||
+    if (a.fills[i].container != b.fills[i].container || a.fills[i].around != b.fills[i].around ||
         a.fills[i].box.has_value() != b.fills[i].box.has_value() ||
         a.fills[i].round.has_value() != b.fills[i].round.has_value())
       return false;
@@ -133,7 +146,15 @@ Container container(int index, const Domain& domain) {
     Tilt tilt{vec(-1, 1), vec(0.1, 1).normalized(), {}};
     const int keys = integer(1, 4);
     for (int k = 0; k < keys; ++k) tilt.keys.push_back({k + real(0, 0.9), real(-6, 6)});
+    if (coin()) tilt.rate = real(-30, 30);
+    if (coin()) tilt.oscillation = {real(-1, 1), real(0.1, 9), real(-4, 4)};
     c.tilt = tilt;
+  }
+  if (coin()) {
+    Translation& translation = c.translation.emplace();
+    if (coin()) translation.keys.push_back({real(0.1, 9), vec(-1, 1)});
+    if (coin()) translation.velocity = vec(-1, 1);
+    if (coin()) translation.oscillation = {vec(-1, 1), real(0.1, 9), real(-4, 4)};
   }
   if (coin()) c.surface_velocity = vec(-1, 1);
   return c;
@@ -171,6 +192,8 @@ Scene any_scene() {
       }
       fill.box = fill.round->bounds();
     }
+    for (const auto& c : s.containers)
+      if (c.name != fill.container && coin()) fill.around.push_back(c.name);
     fill.velocity = vec(-1, 1);
     if (coin()) {
       for (Eigen::Index a = 0; a < 3; ++a) fill.velocity_gradient.col(a) = vec(-9, 9);

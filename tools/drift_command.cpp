@@ -97,7 +97,7 @@ void check(DriftArguments& arguments) {
 /// States of a scene to begin windows from: the phases of a pour, or eighths of the time.
 std::vector<Fixture> phases_of(const Scene& scene) {
   const bool tilts = std::any_of(scene.containers.begin(), scene.containers.end(),
-                                 [](const Container& c) { return c.tilt.has_value(); });
+                                 [](const Container& c) { return c.tilt && c.tilt->keys.size() > 1; });
   std::vector<Phase> phases;
   if (tilts)
     for (const char* name : {"settled", "tilt-onset", "stream", "splash", "filling", "rest"})

@@ -43,9 +43,9 @@ double phase_time(const Scene& scene, const std::string& name) {
   if (named == fraction_of_tilt.end())
     refuse(name, fmt::format("one of {}, or NAME=TIME", fmt::join(phase_names(), ", ")));
   const auto tilted = std::find_if(scene.containers.begin(), scene.containers.end(),
-                                   [](const Container& c) { return c.tilt.has_value(); });
+                                   [](const Container& c) { return c.tilt && c.tilt->keys.size() > 1; });
   if (tilted == scene.containers.end())
-    refuse(name, "start or rest, or NAME=TIME: nothing tilts in this scene");
+    refuse(name, "start or rest, or NAME=TIME: nothing in this scene tilts from key to key");
   const double first = tilted->tilt->keys.front().time, last = tilted->tilt->keys.back().time;
   return std::min(first + named->second * (last - first), scene.schedule.end);
 }
