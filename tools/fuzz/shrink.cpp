@@ -2,6 +2,7 @@
 /// Shrinking: a failure is made as small as it stays one. First particles leave, by halves, quarters and
 /// so on to one (Zeller & Hildebrandt, IEEE Trans. Softw. Eng. 28 (2002), `ddmin`), then what is around
 /// them is made plain, then every number goes towards 0 by halves; over again as long as that helps.
+#include "reference/scene_checks.hpp"
 #include "tools/fuzz/campaign.hpp"
 
 #include <algorithm>
@@ -40,6 +41,7 @@ class Shrinking {
     ++best_.tries;
     Outcome outcome;
     try {
+      check_scene(problem_of(candidate, "fuzz").scene, "fuzz");
       outcome = tester_.test_one(candidate, best_.seed, best_.outcome);
     } catch (const std::exception&) {
       return false;  // no scene
@@ -69,11 +71,38 @@ class Shrinking {
     take(plainer);
   }
 
+  /// Without a container; its particles go to the first room.
+  static void drop_vessel(Genome& g, std::size_t k) {
+    if (g.vessels.size() == 1) g.size = g.vessels[0].size;
+    g.vessels.erase(g.vessels.begin() + static_cast<std::ptrdiff_t>(k));
+    const int room = static_cast<int>(k);
+    for (Point& p : g.points)
+      p.room = p.room == room ? 0 : p.room - (p.room > room);
+  }
+
+  void drop_vessels() {
+    for (std::size_t k = best_.genome.vessels.size(); k-- > 0;)
+      attempt([k](Genome& g) { drop_vessel(g, k); });
+    for (std::size_t k = 0; k < best_.genome.vessels.size(); ++k) {
+      const auto of = [k](auto change) { return [k, change](Genome& g) { change(g.vessels[k]); }; };
+      attempt(of([](Vessel& v) { v.tilts = 0; v.steps = {}; }));
+      attempt(of([](Vessel& v) { v.steps = {}; }));
+      for (std::size_t last = best_.genome.vessels[k].steps.size(); last-- > 0;)
+        attempt(of([last](Vessel& v) { v.steps.erase(v.steps.begin() + static_cast<std::ptrdiff_t>(last)); }));
+      attempt(of([](Vessel& v) { v.belt = {}; }));
+      attempt(of([](Vessel& v) { v.pivot = {}; }));
+      attempt(of([](Vessel& v) { v.axis = {0, 1, 0}; }));
+      for (int Vessel::*number : {&Vessel::angle, &Vessel::start, &Vessel::gap, &Vessel::side})
+        attempt(of([number](Vessel& v) { v.*number = 0; }));
+      attempt(of([](Vessel& v) { v.shift = {}; }));
+      attempt(of([](Vessel& v) { v.form = is_revolved(v.form) ? Form::cup : Form::tank; }));
+      for (std::size_t a = 0; a < 3; ++a)
+        attempt(of([a](Vessel& v) { v.size[a] = 5; }));
+    }
+  }
+
   void make_plain() {
-    attempt([](Genome& g) { g.room = Room::open; });
-    attempt([](Genome& g) {
-      if (g.room == Room::tilting_cup) g.room = Room::cup;
-    });
+    drop_vessels();
     attempt([](Genome& g) { g.periodic = {}; });
     for (std::size_t a = 0; a < 3; ++a)
       attempt([a](Genome& g) { g.periodic[a] = 0; });
@@ -82,14 +111,17 @@ class Shrinking {
       g.far = 0;
     });
     attempt([](Genome& g) { g.far = 0; });
-    for (int Genome::*number : {&Genome::belt, &Genome::floor, &Genome::turn, &Genome::substep, &Genome::friction,
-                                &Genome::restitution, &Genome::contact, &Genome::tension,
-                                &Genome::linear_state, &Genome::viscosity,
-                                &Genome::wall_viscosity, &Genome::kernel, &Genome::scale})
+    for (int Genome::*number :
+         {&Genome::floor, &Genome::floor_gap, &Genome::reversed, &Genome::mass, &Genome::rest_density,
+          &Genome::sound_speed, &Genome::substep, &Genome::friction, &Genome::restitution, &Genome::contact,
+          &Genome::tension, &Genome::linear_state, &Genome::viscosity, &Genome::wall_viscosity,
+          &Genome::kernel, &Genome::scale})
       attempt([number](Genome& g) { g.*number = 0; });
+    attempt([](Genome& g) { g.gravity = Genome{}.gravity; });
     attempt([](Genome& g) { g.support = 4; });
     attempt([](Genome& g) { g.layers = 1; });
     attempt([](Genome& g) { g.courant = 4; });
+    attempt([](Genome& g) { g.frames = 1; });
     for (std::size_t a = 0; a < 3; ++a)
       attempt([a](Genome& g) { g.size[a] = 5; });
     attempt([](Genome& g) {
