@@ -126,14 +126,14 @@ void judge_mass(const Run& r, const Fixture& fixture, const Judgement& oracle, S
         "particles more than the oracle's are outside the domain", -1);
 }
 
-/// Nothing, where the oracle's own run stays out of walls. Where a floor holds particles inside one, a
-/// distance to the wall is rounded as in tolerance.hpp: 8 u X, X the largest magnitude it passes
-/// through.
+/// A distance to a wall is rounded as in tolerance.hpp: 8 u X, X the largest magnitude it passes through.
+/// Where the oracle's own run stays out of walls, pushes end at the contact distance, so that rounding shows
+/// only as far as it exceeds that: not at all, unless contact is at the surface itself.
 double depth_tolerance(const Scene& scene, double oracle_deepest) {
-  if (oracle_deepest == 0) return 0;
   double X = std::max(scene.domain.min.cwiseAbs().maxCoeff(), scene.domain.max.cwiseAbs().maxCoeff());
   for (const Container& c : scene.containers) X = std::max(X, c.origin.cwiseAbs().maxCoeff());
-  return 8 * unit_roundoff * X;
+  const double rounding = 8 * unit_roundoff * X;
+  return oracle_deepest == 0 ? std::max(0.0, rounding - scene.contact_distance()) : rounding;
 }
 
 void judge_containment(const Run& r, const Scene& scene, const Judgement& oracle, Sheet& sheet) {
