@@ -2,6 +2,7 @@
 """Records the fixtures fixtures/hostile-*.h5: states that nobody pours but ports break on."""
 
 import argparse
+import json
 import subprocess
 import tempfile
 from pathlib import Path
@@ -28,6 +29,77 @@ def cup(rng, n, reach=0.016, low=0.003, high=0.023):
         if all(np.sum((x - y) ** 2) > (0.7 * dx) ** 2 for y in points):
             points.append(x)
     return tilted(np.array(points))
+
+
+def scene_of(fixtures, name):
+    text = (fixtures / "scenes" / f"{name}.json").read_text()
+    return json.loads("\n".join(line for line in text.split("\n") if not line.strip().startswith("//")))
+
+
+def to_world(container, time, x):
+    """Points of a container's frame where they are at a time (s)."""
+    x = x + np.array(container.get("origin", [0, 0, 0]))
+    if "tilt" not in container:
+        return x
+    tilt = container["tilt"]
+    times = [key["time"] for key in tilt["keys"]]
+    angles = [key["angle"] if "angle" in key else np.radians(key["angle_deg"]) for key in tilt["keys"]]
+    k = np.searchsorted(times, time, side="right")
+    if k in (0, len(times)):
+        angle = angles[min(k, len(times) - 1)]
+    else:
+        s = (time - times[k - 1]) / (times[k] - times[k - 1])
+        angle = angles[k - 1] + (angles[k] - angles[k - 1]) * s * s * (3 - 2 * s)
+    axis = np.array(tilt["axis"], float)
+    axis, pivot = axis / np.linalg.norm(axis), np.array(tilt["pivot"])
+    x = x - pivot
+    return (pivot + x * np.cos(angle) + np.cross(axis, x) * np.sin(angle)
+            + np.outer(x @ axis, axis) * (1 - np.cos(angle)))
+
+
+def spread(rng, n, low, high, apart, inside=lambda x: True):
+    """n points of a box that `inside` accepts, at least so far apart."""
+    points = np.zeros((0, 3))
+    while len(points) < n:
+        x = rng.uniform(low, high)
+        if inside(x) and (((points - x) ** 2).sum(1) > apart**2).all():
+            points = np.concatenate([points, [x]])
+    return points
+
+
+def astray(rng, fixtures):
+    """(name, time, positions) in scenes whose keys have no usual value."""
+    # In the bowl and a little into its wall; on the floor where the outer wall leans over it.
+    inner = spread(rng, 320, [-0.03, -0.03, -0.001], [0.03, 0.03, 0.03], 0.0036,
+                   lambda x: np.hypot(x[0], x[1]) < 0.0125 + 0.633 * x[2])
+    foot = spread(rng, 60, [-0.042, -0.042, -0.0165], [0.042, 0.042, -0.0095], 0.0032,
+                  lambda x: 0.0295 < np.hypot(x[0], x[1]) < 0.04)
+    yield "bowl", 0.0, np.concatenate([inner, foot])
+
+    # Fluid near all faces, some of it in the walls, where the box stands between its third and fourth key.
+    box = scene_of(fixtures, "hostile-tilted-box")["containers"][0]
+    yield "tilted-box", 0.75, to_world(
+        box, 0.75, spread(rng, 290, [-0.0007, -0.0007, -0.0007], [0.0327, 0.0247, 0.026], 0.0029))
+
+    yield "belt", 0.0, spread(rng, 400, [0.004, -0.01, -0.0001], [0.02, 0.01, 0.0101], 0.0012)
+
+    # About all four: through the hourglass, in the dish, on the shelf and under its lowest corner, round the plug.
+    scene = scene_of(fixtures, "hostile-vessels")
+    hourglass, dish, shelf, plug = scene["containers"]
+    time, apart = 0.3, 0.0035
+    corner = to_world(shelf, time, np.array([[x, y, z] for x in (-0.01, 0.025) for y in (-0.01, 0.03)
+                                             for z in (-0.01, 0.02)]))
+    lowest = corner[corner[:, 2].argmin()]
+    floor = scene["floor"]["height"]
+    yield "vessels", time, np.concatenate([
+        to_world(hourglass, time, spread(rng, 60, [-0.017, -0.017, -0.003], [0.017, 0.017, 0.033], apart,
+                                         lambda x: np.hypot(x[0], x[1]) < 0.017)),
+        to_world(dish, time, spread(rng, 70, [-0.024, -0.024, 0.0005], [0.024, 0.024, 0.018], apart,
+                                    lambda x: np.hypot(x[0], x[1]) < 0.012 + x[2])),
+        to_world(shelf, time, spread(rng, 80, [-0.0005, -0.0005, -0.0005], [0.025, 0.02, 0.02], apart)),
+        spread(rng, 14, [*(lowest[:2] - 0.006), floor - 0.0005], [*(lowest[:2] + 0.006), floor + 0.003], 0.0022),
+        to_world(plug, time, spread(rng, 70, [-0.019, -0.019, -0.004], [0.019, 0.019, 0.025], apart,
+                                    lambda x: np.hypot(x[0], x[1]) > 0.0135 or not 0.0005 < x[2] < 0.0195))])
 
 
 def states(rng):
@@ -65,10 +137,10 @@ def states(rng):
         loose[k, k % 3] = (0.00127, 0.06 - 0.00127, -0.001, 0.0615)[k % 4]
     yield "crowd", "hostile-tank", np.concatenate([crowd + middle, loose])
 
-    spread = np.stack(np.meshgrid(np.arange(10), np.arange(9), np.arange(12)), -1).reshape(-1, 3)
-    spread = (spread + 0.5 + rng.uniform(-0.3, 0.3, spread.shape)) * 0.001 + [-0.003, 0, 0]
-    spread[1] = spread[0]
-    yield "periodic", "hostile-channel", spread
+    channel = np.stack(np.meshgrid(np.arange(10), np.arange(9), np.arange(12)), -1).reshape(-1, 3)
+    channel = (channel + 0.5 + rng.uniform(-0.3, 0.3, channel.shape)) * 0.001 + [-0.003, 0, 0]
+    channel[1] = channel[0]
+    yield "periodic", "hostile-channel", channel
 
     tumbling = np.stack(np.meshgrid(*[np.arange(8)] * 3), -1).reshape(-1, 3)
     tumbling = (tumbling + 0.5 + rng.uniform(-0.3, 0.3, tumbling.shape)) * 0.01 - 0.04
@@ -84,7 +156,11 @@ def main():
     p.add_argument("--fixtures", type=Path, default=Path("fixtures"))
     p.add_argument("--only", nargs="*", help="names")
     a = p.parse_args()
-    for name, scene, position in states(np.random.default_rng(20250726)):
+    problems = [(name, scene, 0.2 if scene == "hostile-cup" else 0.0, position)
+                for name, scene, position in states(np.random.default_rng(20250726))]
+    problems += [(name, f"hostile-{name}", time, position)
+                 for name, time, position in astray(np.random.default_rng(19), a.fixtures)]
+    for name, scene, time, position in problems:
         if a.only and name not in a.only:
             continue
         velocity = np.random.default_rng(7).uniform(-0.2, 0.2, position.shape)
@@ -92,7 +168,7 @@ def main():
             state = Path(folder) / f"{name}.h5"
             with h5py.File(state, "w", libver="v108") as f:
                 f["position"], f["velocity"] = position, velocity
-                f.attrs["time"] = time = 0.2 if scene == "hostile-cup" else 0.0
+                f.attrs["time"] = time
             subprocess.run([a.decant, "record", a.fixtures / "scenes" / f"{scene}.json", "--from", state,
                             "--phase", f"{name}={time}", "--out", a.fixtures / f"hostile-{name}.h5", "--quiet"],
                            check=True)
