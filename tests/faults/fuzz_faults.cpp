@@ -2,7 +2,7 @@
 /// A campaign a fault: how many problems it takes, and what is left of the one that shows it.
 #include "tests/faults/fuzz_faults.hpp"
 
-#include "tests/faults/processes.hpp"
+#include "tests/faults/trials.hpp"
 #include "tools/fuzz/campaign.hpp"
 
 #include <fmt/format.h>
@@ -14,10 +14,10 @@ namespace decant {
 namespace {
 
 /// In the child: "cases particles-found particles-shrunk tries property".
-std::string campaign_text(const std::string& backend, Executor executor, std::int64_t most_cases,
+std::string campaign_text(const std::vector<std::string>& backends, Executor executor, std::int64_t most_cases,
                           std::uint64_t first_seed) {
   fuzz::Settings settings;
-  settings.backends = {backend};
+  settings.backends = backends;
   for (const fuzz::Property& p : fuzz::properties())
     if (p.of_backend) settings.properties.insert(p.name);
   settings.first_seed = first_seed;
@@ -31,6 +31,14 @@ std::string campaign_text(const std::string& backend, Executor executor, std::in
                      f.outcome.property);
 }
 
+/// The backend that a fault is planted for; all of them, and the options that it needs, where nobody knew.
+std::vector<std::string> backends_of(const nlohmann::json& fault) {
+  if (fault.contains("check")) return {fault.at("backend").get<std::string>()};
+  std::vector<std::string> backends = {"brute", "hash", "list"};
+  if (fault.contains("backend")) backends.push_back(fault.at("backend").get<std::string>());
+  return backends;
+}
+
 }  // namespace
 
 std::string fuzz_faults(const nlohmann::json& faults, Executor executor, int jobs,
@@ -41,7 +49,7 @@ std::string fuzz_faults(const nlohmann::json& faults, Executor executor, int job
   // A fault by which the campaign itself cannot run is not found: what throws is no crash.
   const std::vector<Said> found = in_processes(planted.size(), jobs, 300, [&](std::size_t k) {
     choose_fault(executor, planted[k]["number"].get<int>());
-    return campaign_text(planted[k]["backend"].get<std::string>(), executor, most_cases, first_seed);
+    return campaign_text(backends_of(planted[k]), executor, most_cases, first_seed);
   });
   std::string table = fmt::format("{:<26} {:<22} {:>8} {:>10} {:>8} {:>6}  {}\n", "fault", "backend",
                                   "problems", "particles", "shrunk", "tries",
@@ -59,7 +67,7 @@ std::string fuzz_faults(const nlohmann::json& faults, Executor executor, int job
     if (hit && told) cases.push_back(tried);
     table += fmt::format("{:<26} {:<22} {:>8} {:>10} {:>8} {:>6}  {}; {}\n",
                          planted[k]["name"].get<std::string>(),
-                         planted[k]["backend"].get<std::string>(), told ? tried : 0,
+                         planted[k].value("backend", "all"), told ? tried : 0,
                          told && hit ? std::to_string(particles) : "-",
                          told && hit ? std::to_string(shrunk) : "-", tries,
                          !hit ? "NOT FOUND" : told ? property : found[k].ended,

@@ -11,9 +11,6 @@
 
 namespace decant {
 
-/// Turns one fault on; 0: none.
-void choose_fault(Executor executor, int number);
-
 /// Fuzzes each fault from the same first seed until a property fails, in a process of its own, and shrinks
 /// what was found. Returns the table; `all_found` tells the rest.
 std::string fuzz_faults(const nlohmann::json& faults, Executor executor, int jobs,

@@ -3,11 +3,9 @@
 /// Each runs in a process of its own, so that one that crashes or hangs is one more that was caught.
 /// Exit status: 0 every fault caught by the check that is there for it and the backends without a fault
 /// pass; 1 otherwise; 2 bad input.
-#include "gpu/backends.hpp"
-#include "gpu/fault.hpp"
-#include "oracle/conform.hpp"
 #include "tests/faults/fuzz_faults.hpp"
-#include "tests/faults/processes.hpp"
+#include "tests/faults/held_out.hpp"
+#include "tests/faults/trials.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -18,130 +16,10 @@
 #include <fstream>
 #include <iostream>
 #include <map>
-#include <set>
-#include <sstream>
 #include <tuple>
 
 namespace decant {
-#if DECANT_HAS_CUDA
-namespace gpu::cuda {
-void choose_fault(int number);
-}
-#endif
-
-void choose_fault(Executor executor, int number) {
-  gpu::fault_on_host = number;
-#if DECANT_HAS_CUDA
-  if (executor == Executor::cuda) gpu::cuda::choose_fault(number);
-#else
-  (void)executor;
-#endif
-}
-
 namespace {
-
-struct Trial {
-  int number = 0;  // 0: no fault
-  std::string backend, fixture;
-  CheckSelection checks = all_checks();
-};
-
-/// What one trial's process said before it ended.
-struct Outcome {
-  bool caught = false;  // by anything
-  std::string ended;    // "", "crash", "hang"
-  /// Largest score of the failing rows by check, infinite where there was nothing to compare.
-  std::map<std::string, double> failed;
-};
-
-/// The fixtures' oracles, prepared before any process is split off.
-struct Prepared {
-  Fixture fixture;
-  Judgement oracle;
-};
-
-void say(const CheckRow& row, std::ostream& out) {
-  if (judged_verdict(row) == Verdict::pass) return;
-  out << row.check << '\t' << row.field << '\t' << row.score << '\n';
-}
-
-/// What plant.py says of a fault.
-std::string text(const nlohmann::json& fault, const char* key) {
-  return fault.at(key).get<std::string>();
-}
-int number(const nlohmann::json& fault) { return fault.at("number").get<int>(); }
-
-/// In the child: judges; the failing rows.
-std::string failing_rows(const Trial& trial, Executor executor, const Prepared& p) {
-  choose_fault(executor, trial.number);
-  const auto backend = backend_of(trial.backend, executor);
-  std::ostringstream out;
-  for (const CheckRow& row : judge(*backend, p.fixture, p.oracle, trial.checks)) say(row, out);
-  return out.str();
-}
-
-Outcome outcome_of(const Said& said) {
-  Outcome o;
-  std::istringstream lines(said.text);
-  for (std::string line; std::getline(lines, line);) {
-    std::istringstream columns(line);
-    std::string check, field, score;
-    std::getline(columns, check, '\t');
-    std::getline(columns, field, '\t');
-    std::getline(columns, score);
-    const double value = std::stod(score);
-    const auto known = o.failed.find(check);
-    if (known == o.failed.end() || !(value <= known->second)) o.failed[check] = value;
-  }
-  if (!said.ended.empty()) o.ended = said.ended == "hang" ? "hang" : "crash";
-  o.caught = !o.failed.empty() || !o.ended.empty();
-  return o;
-}
-
-std::vector<Outcome> run_all(const std::vector<Trial>& trials, Executor executor, int jobs,
-                             const std::map<std::string, Prepared>& prepared) {
-  std::vector<Outcome> outcomes;
-  for (const Said& said : in_processes(trials.size(), jobs, 60, [&](std::size_t k) {
-         return failing_rows(trials[k], executor, prepared.at(trials[k].fixture));
-       }))
-    outcomes.push_back(outcome_of(said));
-  return outcomes;
-}
-
-/// Trials of a backend without a fault, which must pass: "brute on hostile-exact-support fails …".
-std::string failures_without_fault(const std::vector<Trial>& trials, Executor executor, int jobs,
-                                   const std::map<std::string, Prepared>& prepared) {
-  std::string text;
-  const auto outcomes = run_all(trials, executor, jobs, prepared);
-  for (std::size_t t = 0; t < trials.size(); ++t)
-    if (outcomes[t].caught)
-      text += fmt::format("without a fault: {} fails on {} ({})\n", trials[t].backend,
-                          trials[t].fixture,
-                          outcomes[t].failed.empty() ? outcomes[t].ended
-                                                     : outcomes[t].failed.begin()->first);
-  return text;
-}
-
-/// Every pair of backend and fixture once, without a fault.
-std::vector<Trial> clean(const std::vector<Trial>& trials) {
-  std::set<std::pair<std::string, std::string>> pairs;
-  for (const Trial& t : trials) pairs.emplace(t.backend, t.fixture);
-  std::vector<Trial> all;
-  for (const auto& [backend, fixture] : pairs) all.push_back({0, backend, fixture});
-  return all;
-}
-
-std::map<std::string, Prepared> prepare_all(const std::vector<Trial>& trials,
-                                            const std::filesystem::path& folder) {
-  std::map<std::string, Prepared> prepared;
-  for (const Trial& t : trials) {
-    if (prepared.count(t.fixture)) continue;
-    Fixture fixture = read_fixture(folder / (t.fixture + ".h5"));
-    Judgement oracle = prepare(fixture);
-    prepared.emplace(t.fixture, Prepared{std::move(fixture), std::move(oracle)});
-  }
-  return prepared;
-}
 
 struct Settings {
   std::string list, folder = "fixtures", executor = "host", out, equivalent;
@@ -156,13 +34,6 @@ int finish(const Settings& s, const std::string& table, bool passes) {
   std::cout << table;
   if (!s.out.empty()) std::ofstream(s.out) << table;
   return passes ? 0 : 1;
-}
-
-std::string joined(const std::map<std::string, double>& failed, const std::string& but) {
-  std::string names;
-  for (const auto& [name, score] : failed)
-    if (name != but) names += (names.empty() ? "" : ", ") + name;
-  return names;
 }
 
 /// The catalogue: each fault against the check that is there for it.
@@ -313,6 +184,12 @@ int run(const Settings& s) {
     const std::string table =
         fuzz_faults(faults, executor, s.jobs, s.fuzz, s.first_seed, all_found);
     return finish(s, table, all_found);
+  }
+  if (!faults.empty() && faults[0].contains("shows")) {
+    bool all_caught = false;
+    const std::string table =
+        judge_held_out(faults, executor, s.jobs, s.folder, s.only, all_caught);
+    return finish(s, table, all_caught);
   }
   const bool mutations = !faults.empty() && !faults[0].contains("check");
   return mutations ? run_mutations(s, faults, executor) : run_catalogue(s, faults, executor);
