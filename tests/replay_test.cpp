@@ -68,11 +68,11 @@ std::vector<CheckRow> judged(const Edit& edit) {
   return judge(backend, recorded(), oracle(), {"fields"});
 }
 
-const CheckRow& row_of(const std::vector<CheckRow>& rows, const std::string& check,
-                       const std::string& field) {
+const CheckRow& row_of(const std::vector<CheckRow>& rows, std::string_view check,
+                       std::string_view field) {
   for (const CheckRow& row : rows)
     if (row.check == check && row.field == field) return row;
-  throw std::logic_error("no row " + check + " " + field);
+  throw std::logic_error("no row " + std::string(check) + " " + std::string(field));
 }
 
 TEST(FailingRow, TellsValuePlaceAndNeighborsOfItsWorstParticle) {

@@ -25,10 +25,10 @@ namespace fs = std::filesystem;
 
 const fs::path fixtures = fs::path(DECANT_SOURCE_DIR) / "fixtures";
 
-const ValidationCase& case_named(const std::string& name) {
+const ValidationCase& case_named(std::string_view name) {
   for (const auto& which : validation_cases())
     if (which.name == name) return which;
-  throw std::out_of_range(name);
+  throw std::out_of_range(std::string(name));
 }
 
 /// A run that never runs: states are handed to the case's observer.
@@ -64,10 +64,10 @@ struct Staged {
   std::unique_ptr<CaseObserver> observer;
 };
 
-const ValidationQuantity& quantity(const ValidationResult& result, const std::string& start) {
+const ValidationQuantity& quantity(const ValidationResult& result, std::string_view start) {
   for (const auto& q : result.quantities)
     if (q.name.starts_with(start)) return q;
-  throw std::out_of_range(start);
+  throw std::out_of_range(std::string(start));
 }
 
 TEST(ExactSolutions, CupResidualHasThePublishedVolumes) {
