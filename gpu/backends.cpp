@@ -73,7 +73,7 @@ class DeviceBackend : public Backend {
     scene_ = scene;
     substep_ = state.substep;
     gpu::Problem problem{gpu::make_constants(scene), gpu::make_geometry(scene),
-                         gpu::make_wall_samples(scene, walls), rows_of(state.position),
+                         gpu::make_region(scene), gpu::make_wall_samples(scene, walls), rows_of(state.position),
                          rows_of(state.velocity)};
     solver_->load(problem);
   }

@@ -163,6 +163,29 @@ Geometry make_geometry(const Scene& scene) {
   return g;
 }
 
+Box make_region(const Scene& scene) {
+  Vec3 low = Vec3::Constant(std::numeric_limits<double>::max()), high = -low;
+  for (const Container& container : scene.containers) {
+    const Pose pose = pose_at(container, 0);
+    const Bounds bounds(container);
+    for (int k = 0; k < 8; ++k) {
+      const Vec3 corner = pose.to_world(bounds.corner(k));
+      low = low.cwiseMin(corner);
+      high = high.cwiseMax(corner);
+    }
+  }
+  for (const Fill& fill : scene.fills) {
+    // A fill that names a container lies in it.
+    if (!fill.box || !fill.container.empty()) continue;
+    low = low.cwiseMin(fill.box->min);
+    high = high.cwiseMax(fill.box->max);
+  }
+  low = low.cwiseMax(scene.domain.min);
+  high = high.cwiseMin(scene.domain.max);
+  if (!(low.array() <= high.array()).all()) return {to_float3(scene.domain.min), to_float3(scene.domain.max)};
+  return {to_float3(low), to_float3(high)};
+}
+
 WallSamples make_wall_samples(const Scene& scene, const Walls& walls) {
   WallSamples samples;
   samples.container_begin.push_back(0);

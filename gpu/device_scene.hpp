@@ -88,6 +88,9 @@ struct WallSamples {
 
 Constants make_constants(const Scene& scene);
 Geometry make_geometry(const Scene& scene);
+/// Where fluid is to be expected, m, world: around the containers as they stand at the start and the fills,
+/// cut to the domain; the domain where there is neither. Of the scene alone.
+Box make_region(const Scene& scene);
 WallSamples make_wall_samples(const Scene& scene, const Walls& walls);
 
 /// Poses of all containers at `count` substeps from `first` on: count × containers, substep major. The

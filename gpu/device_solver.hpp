@@ -18,6 +18,7 @@ namespace decant::gpu {
 struct Problem {
   Constants constants;
   Geometry geometry;
+  Box region;  // of make_region
   WallSamples walls;
   std::vector<float> position, velocity;  // [N,3] row-major, m, m/s
 };

@@ -26,7 +26,7 @@ class GridSearch {
   static constexpr bool points_carry_square = false;
 
   void load(Queue& queue, const Constants& c, const Arrays& a, const WallStore& walls,
-            const std::vector<float>& positions) {
+            const Box& region) {
     c_ = c;
     n_ = a.n;
     walls_ = walls;
@@ -36,7 +36,7 @@ class GridSearch {
     lanes_ = o_.lanes ? o_.lanes : fitting_lanes();
 #endif
     sort_fluid_ = !(reuses_ && o_.build == SolverOptions::Build::all_pairs);
-    prepare_fluid(queue, positions);
+    prepare_fluid(queue, region);
     grids_.prepare(queue, c_, a, walls_,
                    {walls_have_cells(), !reuses_ && o_.source == SolverOptions::Source::rebuilt,
                     !large(), reach_},
@@ -161,12 +161,14 @@ class GridSearch {
   bool keeps_pairs() const { return reuses_ || o_.pairs == SolverOptions::Pairs::keep; }
   bool walls_have_cells() const { return reuses_ ? sort_fluid_ : o_.grid == SolverOptions::Grid::all; }
 
-  void prepare_fluid(Queue& queue, const std::vector<float>& positions) {
-    double low[3], high[3];
-    bounds(positions, low, high);
+  /// The order of sums is that of the cells. So that it depends on the state at hand alone and not on one
+  /// that was once loaded, which a resumed pour does not know, the table is the scene's.
+  void prepare_fluid(Queue& queue, const Box& region) {
+    const double low[3] = {region.min.x, region.min.y, region.min.z};
+    double high[3] = {region.max.x, region.max.y, region.max.z};
     for (int a = 0; a < 3; ++a) {
       // What falls out of a cup stays within a few times its size, if it stays in the domain.
-      const double most = 3 * (high[a] - low[a]) + 16.0 * reach_;
+      const double most = high[a] - low[a] + 16.0 * reach_;
       const double domain = double(c_.domain_max[a]) - c_.domain_min[a];
       high[a] = low[a] + std::min(most, domain);
     }
@@ -306,15 +308,6 @@ class GridSearch {
     const std::size_t threads = static_cast<std::size_t>(lanes_) * static_cast<std::size_t>(n_);
     lists_.resize(Lists::room(threads, capacity_));
     counts_.resize(threads);
-  }
-
-  static void bounds(const std::vector<float>& rows, double low[3], double high[3]) {
-    for (std::size_t a = 0; a < 3; ++a) low[a] = high[a] = rows.empty() ? 0 : rows[a];
-    for (std::size_t k = 0; k < rows.size(); ++k) {
-      const double x = rows[k];
-      if (x < low[k % 3]) low[k % 3] = x;
-      if (x > high[k % 3]) high[k % 3] = x;
-    }
   }
 
   // Bounds of a skin that is chosen here, and what lists are first made for; shares of H.

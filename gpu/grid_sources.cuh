@@ -36,6 +36,7 @@ struct FluidSource {
     return is_finite(there) ? there : x;
   }
   DECANT_DEVICE int id(int i) const { return a.id[i]; }
+  DECANT_DEVICE int rank(int i) const { return a.id[i]; }
   DECANT_DEVICE void begin() const {
     a.mailbox->stale = 0;
     a.mailbox->wall_way = 0.0f;
@@ -69,6 +70,7 @@ struct FrameWallSource {
   int2* desk() const { return room; }
   DECANT_DEVICE Float3 position(int k) const { return xyz(from[k]); }
   DECANT_DEVICE int id(int k) const { return from_id[k]; }
+  DECANT_DEVICE int rank(int k) const { return k; }
   DECANT_DEVICE void begin() const {}
   DECANT_DEVICE void place(int k, int id, int to, int) const {
     local[to] = from[k];
@@ -89,6 +91,7 @@ struct WorldWallSource {
     return rotate(pose, frame.position(k)) + pose.translation;
   }
   DECANT_DEVICE int id(int k) const { return frame.id(k); }
+  DECANT_DEVICE int rank(int k) const { return k; }
   DECANT_DEVICE void begin() const {}
   DECANT_DEVICE void place(int k, int id, int to, int bucket) const {
     frame.place(k, id, to, bucket);

@@ -47,7 +47,7 @@ class Pipeline : public DeviceSolver {
     times_ = {};
     rebuilds_ = advances_ = 0;
     totals_ = {};
-    search_.load(queue_, c_, arrays(), wall_store_, problem.position);
+    search_.load(queue_, c_, arrays(), wall_store_, problem.region);
     queue_.wait();
     loaded_ = true;
   }

@@ -22,7 +22,7 @@ class PlainSearch {
   static constexpr bool points_carry_square = QueryOf<false>::points_carry_square;
 
   void load(Queue& queue, const Constants& c, const Arrays& a, const WallStore& walls,
-            const std::vector<float>&) {
+            const Box&) {
     c_ = c;
     walls_ = walls;
     end_ = a.base + walls.padded_total();

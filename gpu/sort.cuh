@@ -1,10 +1,11 @@
 /// \file
 /// Bringing things into the order of their cells. Two ways: a counting sort, which is what the table
 /// of cells needs anyway, and Thrust's sort by key, as published codes do. Inside a cell the order is
-/// that of the ids (counting) or the one before (Thrust, stable): the same every time.
+/// that of the ids, so that it depends on where things are and not on where they have been.
 ///
-/// A Source tells position(i) and id(i) of thing i, and place(i, id, to, bucket) puts it; begin() is
-/// called once, by whoever comes first; desk() is memory for the sort, of no use to others meanwhile.
+/// A Source tells position(i) and id(i) of thing i, and place(i, id, to, bucket) puts it; rank(i) is a
+/// number of its own below the count of things, in the order of the ids; begin() is called once, by
+/// whoever comes first; desk() is memory for the sort, of no use to others meanwhile.
 #pragma once
 
 #include "gpu/cells.cuh"
@@ -85,8 +86,10 @@ struct PlainKeyPass {
 
   DECANT_DEVICE void operator()(int i) const {
     if (i == 0) source.begin();
-    key[i] = table.bucket_of(source.position(i));
-    index[i] = i;
+    // The sort is stable: what is first in the order of ids stays so in its cell.
+    const int rank = source.rank(i);
+    key[rank] = table.bucket_of(source.position(i));
+    index[rank] = i;
   }
 };
 
