@@ -49,7 +49,8 @@ const std::vector<CheckDescription>& check_descriptions() {
        "Depth inside any wall and paths through walls during the run, judged in double from positions and "
        "from the way between two looks, in each container's own frame.",
        "No deeper, and no more crossings, than the oracle's own run shows; where that is inside a wall "
-       "itself, a distance's rounding of 8 u X deeper, and elsewhere what exceeds the contact distance of that.",
+       "itself, or there is a floor, a distance's rounding of 8 u X deeper; elsewhere what of that exceeds "
+       "the contact distance.",
        "What happens between two looks and is undone."},
       {"conservation",
        "The forces between fluid particles add up to nothing, pressure and viscosity apart: momentum.",

@@ -128,12 +128,13 @@ void judge_mass(const Run& r, const Fixture& fixture, const Judgement& oracle, S
 
 /// A distance to a wall is rounded as in tolerance.hpp: 8 u X, X the largest magnitude it passes through.
 /// Where the oracle's own run stays out of walls, pushes end at the contact distance, so that rounding shows
-/// only as far as it exceeds that: not at all, unless contact is at the surface itself.
+/// only as far as it exceeds that: not at all, unless contact is at the surface itself. A floor may hold
+/// particles at any distance from a wall.
 double depth_tolerance(const Scene& scene, double oracle_deepest) {
   double X = std::max(scene.domain.min.cwiseAbs().maxCoeff(), scene.domain.max.cwiseAbs().maxCoeff());
   for (const Container& c : scene.containers) X = std::max(X, c.origin.cwiseAbs().maxCoeff());
   const double rounding = 8 * unit_roundoff * X;
-  return oracle_deepest == 0 ? std::max(0.0, rounding - scene.contact_distance()) : rounding;
+  return oracle_deepest == 0 && !scene.floor ? std::max(0.0, rounding - scene.contact_distance()) : rounding;
 }
 
 void judge_containment(const Run& r, const Scene& scene, const Judgement& oracle, Sheet& sheet) {

@@ -83,6 +83,37 @@ TEST(Campaign, WhatItOnceFoundIsSettled) {
   EXPECT_GT(count, 2);
 }
 
+/// Where a push, or a floor, leaves a particle on a wall's very surface, fp32 may have it a distance's rounding
+/// inside. Found by seeds 1196 and 1244; both shrunk to one particle below a tank.
+TEST(Campaign, HoldsAParticleOnASurfaceToTheRoundingOfADistance) {
+  Genome pushed;
+  pushed.layers = 1;
+  pushed.vessels = {Vessel{}};
+  pushed.contact = -5;  // at the surface
+  pushed.points = {{{3 * fine, fine, -2 * fine}, {}}};
+  Genome held = pushed;
+  held.contact = 0;  // at dx/4
+  held.floor = 1;
+  held.floor_gap = 4;  // sixteenths of dx below the tank: contact with the floor ends on the tank
+  held.points = {{{0, 5 * fine, -3 * fine}, {}}};
+  for (const Genome& genome : {pushed, held}) {
+    Fixture f = problem_of(genome, "surface");
+    f.ensemble.substeps = run_substeps;
+    const Judgement oracle = prepare(f, {"containment"});
+    EXPECT_EQ(oracle.deepest, 0);
+    const auto fails = [&](Backend& backend) {
+      for (const CheckRow& row : judge(backend, f, oracle, {"containment"}))
+        if (judged_verdict(row) != Verdict::pass) return true;
+      return false;
+    };
+    for (const char* name : {"brute", "hash", "list"}) EXPECT_FALSE(fails(*on_host(name))) << name;
+    test::Edit edit;
+    edit.advanced = [](ParticleState& state) { state.position.row(2).array() += 1e-6; };
+    test::EditedReference deeper(edit);
+    EXPECT_TRUE(fails(deeper));
+  }
+}
+
 TEST(Campaign, FindsNothingInWhatIsRight) {
   Settings s = settings_of(48, all_properties());
   s.backends = {"brute", "hash", "list"};
