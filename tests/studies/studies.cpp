@@ -5,10 +5,12 @@
 ///           A correct backend above 1 is a false alarm; a median below 0.01 is a bound too loose.
 /// ensemble  thousands of disturbed runs of the oracle against the bound of the recorded ensemble: how
 ///           often a correct run would be called wrong; and a viscosity wrong by 1 % against the same.
+/// coverage  which values of which keys of a scene the recordings and fuzzed problems have.
 #include "gpu/backends.hpp"
 #include "oracle/conform.hpp"
 #include "reference/sampling.hpp"
 #include "tests/random_scene.hpp"
+#include "tests/scene_coverage.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -34,7 +36,7 @@ struct Settings {
   std::string executor = "host", out;
   std::uint32_t first = 1, cases = 10000;
   std::int64_t members = 1000;
-  int processes = 2;
+  int processes = 2, problems = 1000;
 };
 
 /// Lines of task(k) for all k < count, from several processes; a backend that crashes takes none but its
@@ -215,6 +217,15 @@ int ensemble(const Settings& s) {
   return finish(s, text, alarms * 1000 < runs && caught);
 }
 
+/// Every key of a scene against every recording and the fuzzed problems.
+int coverage(const Settings& s) {
+  const auto keys = test::leaf_keys_of_scenes();
+  const test::Coverage fixtures = test::coverage_of_fixtures(),
+                       fuzzing = test::coverage_of_fuzzing(s.problems);
+  return finish(s, test::coverage_table(fixtures, fuzzing),
+                fixtures.gaps(keys).empty() && fuzzing.gaps(keys).empty());
+}
+
 }  // namespace
 }  // namespace decant
 
@@ -230,13 +241,16 @@ int main(int argc, char** argv) {
   scores->add_option("--executor", s.executor)->check(CLI::IsMember({"host", "cuda"}));
   ensemble->add_option("FIXTURE", s.fixtures)->required();
   ensemble->add_option("--members", s.members, "runs a fixture")->capture_default_str();
+  CLI::App* coverage = app.add_subcommand("coverage", "keys of scenes in recordings and in fuzzing");
+  coverage->add_option("--problems", s.problems, "fuzzed ones")->capture_default_str();
+  coverage->add_option("--out", s.out, "write the table");
   for (CLI::App* verb : {scores, ensemble}) {
     verb->add_option("--processes", s.processes)->capture_default_str();
     verb->add_option("--out", s.out, "write the table");
   }
   CLI11_PARSE(app, argc, argv);
   try {
-    return *scores ? decant::scores(s) : decant::ensemble(s);
+    return *scores ? decant::scores(s) : *coverage ? decant::coverage(s) : decant::ensemble(s);
   } catch (const std::exception& error) {
     std::cerr << error.what() << '\n';
     return 2;
