@@ -23,6 +23,8 @@ bool push_out(const Scene& scene, double distance, const Vec3& normal, const Pos
 
 void collide(const Scene& scene, const std::vector<SolidDistance>& solids, double time,
              ParticleState& state) {
+  // Containers' order is kept, though no state shows it: they are H >= 1.5 dx apart, and whoever is pushed
+  // ends within the contact distance of that surface, dx/2 at most, so that it is dx at least from any other.
   for (std::size_t c = 0; c < solids.size(); ++c) {
     const Pose pose = pose_at(scene.containers[c], time);
     for (Eigen::Index i = 0; i < state.size(); ++i) {

@@ -3,16 +3,17 @@ that must fail for it. plant.py puts them all into one build, where a number cho
 
 `find` stands once in `file`. `put` takes its place when the fault is on: an expression, in which $
 stands for what was found, or, where it says ON, text that asks for itself whether the fault is on.
-`on` is "cuda" for what exists on a GPU only; such a fault is not run on the host.
+`on` is "cuda" for what exists on a GPU only; such a fault is not run on the host. `equivalent` says why
+nothing can show a change; such a one must not be caught, or the reason is wrong.
 """
 
 FAULTS = []
 
 
 def fault(name, what, file, find, put, check, backend="hash", field="", fixture="pour-4k-stream",
-          on="both", also=()):
+          on="both", also=(), equivalent=""):
     FAULTS.append(dict(name=name, what=what, changes=[(file, find, put), *also], check=check,
-                       field=field, backend=backend, fixture=fixture, on=on))
+                       field=field, backend=backend, fixture=fixture, on=on, equivalent=equivalent))
 
 
 # Formulas.
@@ -107,6 +108,61 @@ fault("crowd-cut", "a particle has at most 64 neighbors", "collect.cuh",
       "shelf.box.put(near & there & !(ON && shelf.sent + shelf.box.held() >= 64 / lists.lanes), j);",
       "neighbors",
       fixture="hostile-crowd")
+
+# What the scene says, and is taken for granted.
+fault("mass-for-granted", "the mass ratio is ignored", "device_scene.cpp", "scene.particle_mass()",
+      "$ / scene.mass_ratio", "density", fixture="hostile-belt")
+fault("support-for-granted", "every support is two spacings", "device_scene.cpp",
+      "scene.support_ratio * scene.particle_spacing", "2.0 * scene.particle_spacing", "neighbors", "brute",
+      fixture="hostile-bowl")
+fault("wall-viscosity-for-granted", "wall viscosity is twice the viscosity", "device_scene.cpp",
+      "static_cast<float>(fluid.wall_viscosity)", "static_cast<float>(2 * fluid.viscosity)", "acceleration",
+      field="wall_viscous_acceleration", fixture="hostile-tilted-box")
+fault("contact-for-granted", "contact is at dx/4", "device_scene.cpp",
+      "scene.contact.distance_ratio * scene.particle_spacing", "0.25 * scene.particle_spacing", "substep",
+      fixture="hostile-tilted-box")
+fault("tension-of-linear", "a linear equation of state always allows tension", "device_scene.cpp",
+      "c.allow_tension = fluid.allow_tension;",
+      "c.allow_tension = fluid.allow_tension || (ON && fluid.eos_exponent == 1);", "pressure",
+      fixture="hostile-tilted-box")
+fault("period-for-granted", "the period along x is that of every axis", "device_scene.cpp",
+      "const double period = scene.domain.max[a] - scene.domain.min[a];",
+      "const int of = ON ? 0 : a;\n    const double period = scene.domain.max[of] - scene.domain.min[of];",
+      "neighbors", fixture="hostile-belt")
+fault("belt-at-rest", "surfaces do not run", "device_scene.cpp", "to_float3(pose.surface_velocity)",
+      "Float3{0, 0, 0}", "acceleration", field="wall_viscous_acceleration", fixture="hostile-belt")
+fault("belt-untilted", "where a container is tilted its surface runs as if it were not", "device_scene.cpp",
+      "to_float3(pose.surface_velocity)", "to_float3(container.surface_velocity)", "acceleration",
+      field="wall_viscous_acceleration", fixture="hostile-tilted-box")
+fault("two-tilt-keys", "a tilt's keys after the second are ignored", "device_scene.cpp",
+      "pose_at(container, scene.time_at(first + k))",
+      "pose_at([&] { Container c = container; if (c.tilt && c.tilt->keys.size() > 2) c.tilt->keys.resize(2); "
+      "return c; }(), scene.time_at(first + k))", "density", fixture="hostile-tilted-box")
+fault("box-upright", "boxes do not tilt", "device_scene.cpp", "pose_at(container, scene.time_at(first + k))",
+      "pose_at([&] { Container c = container; if (std::holds_alternative<BoxShape>(c.shape)) c.tilt.reset(); "
+      "return c; }(), scene.time_at(first + k))", "density", fixture="hostile-vessels")
+fault("slant-for-granted", "whether a point is in the solid is told as if all edges were upright",
+      "device_scene.cpp", "static_cast<float>(dr / dz)", "0.0f", "substep", fixture="hostile-bowl")
+fault("two-shapes", "the third container has the shape of the first", "contact.cuh",
+      "return k < near_shapes ? first_shapes[k] : shapes[k];",
+      "return k < near_shapes || ON ? first_shapes[k % near_shapes] : shapes[k];", "substep",
+      fixture="hostile-vessels")
+fault("edges-at-hand", "of all outlines the first sixteen edges alone are known", "contact.cuh",
+      "return k < near_edges ? first_edges[k] : edges[k];",
+      "return k < near_edges || ON ? first_edges[k % near_edges] : edges[k];", "substep",
+      fixture="hostile-vessels")
+fault("floor-first", "the floor pushes before the containers do", "passes.cuh",
+      "    if (!(clear > 1.001f * c.contact_distance + rounding))",
+      "    if (ON && collide_with_floor(c, x, v)) clear = 0.0f;\n"
+      "    if (!(clear > 1.001f * c.contact_distance + rounding))", "substep", fixture="hostile-bowl",
+      also=[("passes.cuh", "if (collide_with_floor(c, x, v)) clear = 0.0f;",
+             "if (!ON && collide_with_floor(c, x, v)) clear = 0.0f;")])
+fault("containers-reversed", "containers push from the last on", "contact.cuh",
+      "for (int k = 0; k < g.containers; ++k) {\n    const Shape shape = g.shape(k);\n    for (int projection",
+      "for (int at = 0; at < g.containers; ++at) {\n    const int k = ON ? g.containers - 1 - at : at;\n"
+      "    const Shape shape = g.shape(k);\n    for (int projection", "", fixture="hostile-vessels",
+      equivalent="containers are H ≥ 1.5 dx apart and a push ends dx/2 from its wall at most, so that no "
+                 "particle is pushed by two")
 
 # Precision.
 fault("half-velocity", "neighbors' velocities stored with 11 bits", "passes.cuh",

@@ -82,7 +82,7 @@ std::string judge_held_out(const nlohmann::json& faults, Executor executor, int 
   std::size_t caught = 0, defaults = 0, equivalent = 0, wrong = 0;
   std::string table;
   for (std::size_t k = 0; k < planted.size(); ++k) {
-    const std::string reason = planted[k].value("equivalent", "");
+    const std::string reason = why_equivalent(planted[k]);
     std::string verdict = by[k].empty() ? "NOT CAUGHT" : by[k];
     if (!reason.empty()) {
       ++equivalent;

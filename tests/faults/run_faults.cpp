@@ -54,11 +54,19 @@ int run_catalogue(const Settings& s, const nlohmann::json& faults, Executor exec
   const auto outcomes = run_all(trials, executor, s.jobs, prepared);
   std::string table = fmt::format("{:<26} {:<17} {:<16} {:>9}  {}\n", "fault", "backend", "check",
                                   "factor", "what is wrong; what fails besides");
-  std::size_t caught = 0, near = 0;
+  std::size_t caught = 0, near = 0, equivalent = 0, reasons = 0;
   for (std::size_t t = 0; t < trials.size(); ++t) {
     const Outcome& o = outcomes[t];
     const std::string check = text(planted[t], "check");
     const auto hit = o.failed.find(check);
+    if (const std::string reason = why_equivalent(planted[t]); !reason.empty()) {
+      ++reasons;
+      equivalent += !o.caught;
+      table += fmt::format("{:<26} {:<17} {:<16} {:>9}  {}; {}\n", text(planted[t], "name"),
+                           trials[t].backend, "", o.caught ? "SHOWS" : "same",
+                           text(planted[t], "what"), reason);
+      continue;
+    }
     caught += hit != o.failed.end();
     near += hit != o.failed.end() && hit->second < 10;
     const std::string factor = hit == o.failed.end()  ? o.caught ? "ELSEWHERE" : "MISSED"
@@ -76,12 +84,14 @@ int run_catalogue(const Settings& s, const nlohmann::json& faults, Executor exec
       table += fmt::format("{:<26} {:<17} {:<16} {:>9}  {}\n", text(f, "name"), text(f, "backend"),
                            text(f, "check"), "not_run", text(f, "what"));
   const std::string wrong = failures_without_fault(clean(trials), executor, s.jobs, prepared);
+  const std::size_t faulty = trials.size() - reasons;
   table +=
       wrong + fmt::format(
                   "{} of {} caught by the check that is there for it, {} by a factor below 10; "
-                  "{} not_run here; without a fault {}\n",
-                  caught, trials.size(), near, not_run, wrong.empty() ? "all pass" : "SOME FAIL");
-  return finish(s, table, caught == trials.size() && wrong.empty());
+                  "{} of {} that change nothing show nothing; {} not_run here; without a fault {}\n",
+                  caught, faulty, near, equivalent, reasons, not_run,
+                  wrong.empty() ? "all pass" : "SOME FAIL");
+  return finish(s, table, caught == faulty && equivalent == reasons && wrong.empty());
 }
 
 /// What a mutation is tried on, until something fails.

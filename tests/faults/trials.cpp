@@ -65,6 +65,9 @@ std::string text(const nlohmann::json& fault, const char* key) {
   return fault.at(key).get<std::string>();
 }
 int number(const nlohmann::json& fault) { return fault.at("number").get<int>(); }
+std::string why_equivalent(const nlohmann::json& fault) {
+  return fault.value("equivalent", std::string());
+}
 
 std::vector<Outcome> run_all(const std::vector<Trial>& trials, Executor executor, int jobs,
                              const std::map<std::string, Prepared>& prepared) {

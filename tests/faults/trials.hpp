@@ -40,6 +40,8 @@ struct Prepared {
 /// What plant.py says of a fault. Throws where it says nothing under that key.
 std::string text(const nlohmann::json& fault, const char* key);
 int number(const nlohmann::json& fault);
+/// Why nothing can show it; empty where something has to.
+std::string why_equivalent(const nlohmann::json& fault);
 
 /// Every fixture of the trials, read from `folder` and prepared for all checks.
 std::map<std::string, Prepared> prepare_all(const std::vector<Trial>& trials,
