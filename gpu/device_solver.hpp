@@ -40,7 +40,7 @@ class DeviceSolver {
  public:
   virtual ~DeviceSolver() = default;
   virtual void load(const Problem& problem) = 0;
-  /// Fields at the present state; `poses` one a container.
+  /// Fields at the present state, from what an advance left in use; `poses` one a container.
   virtual Status evaluate(const std::vector<DevicePose>& poses, const GivenInputs& given,
                           HostFields& out) = 0;
   /// `substeps` onward; `poses` holds substeps + 1 sets, the first at the present time.

@@ -49,6 +49,7 @@ class Pipeline : public DeviceSolver {
     totals_ = {};
     search_.load(queue_, c_, arrays(), wall_store_, problem.region);
     queue_.wait();
+    in_use_ = false;
     loaded_ = true;
   }
 
@@ -60,7 +61,10 @@ class Pipeline : public DeviceSolver {
     if (!given.boundary_volume.empty()) wall_volume_.upload(given.boundary_volume);
     Mailbox mail;
     for (;;) {
-      begin();
+      if (in_use_ && given.boundary_volume.empty())
+        carry_on();
+      else
+        begin();
       const FieldArrays fields = desk_.unwritten(n_);
       with_periodic(c_, [&](auto periodic) {
         constexpr bool p = decltype(periodic)::value;
@@ -71,6 +75,7 @@ class Pipeline : public DeviceSolver {
       });
       queue_.wait();
       mail = mailbox_.download(1)[0];
+      in_use_ = false;
       if (!grow(mail)) break;
     }
     desk_.download(out);
@@ -82,6 +87,7 @@ class Pipeline : public DeviceSolver {
 
   Status advance(int substeps, const std::vector<DevicePose>& poses) override {
     require_loaded();
+    in_use_ = false;
     upload_poses(poses);
     save();
     Mailbox mail;
@@ -93,6 +99,7 @@ class Pipeline : public DeviceSolver {
       if (!grow(mail)) break;
       put_back();
     }
+    in_use_ = true;
     watch_.read();
     rebuilds_ += mail.rebuilds;
     add_times(mail);
@@ -277,6 +284,17 @@ class Pipeline : public DeviceSolver {
     search_.begin(queue_, a);
   }
 
+  /// What the last advance left, lists, counts, and walls where they stand, for fields of what its next
+  /// substep would use: only what that one would do first is done.
+  void carry_on() {
+    Mailbox mail = mailbox_.download(1)[0];
+    mail.non_finite = mail.escaped = mail.missed = ~0ull;
+    mail.begun = mail.ended = 0;
+    mailbox_.upload({mail});
+    if (walls_half_placed_)
+      queue_.for_each(wall_store_.moving_count(), wall_store_.moving<PlacedFor::force>(arrays()));
+  }
+
   /// At once where the search can. Else now and then the first substep is timed stage by stage and so is
   /// the second, which shares a list with the first; the others are replayed. So is the first advance
   /// after a load: what is compared with the oracle is what runs.
@@ -286,6 +304,7 @@ class Pipeline : public DeviceSolver {
       done_at_once = search_.template advance<decltype(periodic)::value>(queue_, arrays(), geometry(),
                                                                          substeps);
     });
+    walls_half_placed_ = done_at_once;
     if (done_at_once) return;
     int done = 0;
     const int sample = advances_++ % 8 == 1 ? 2 : 0;
@@ -383,6 +402,8 @@ class Pipeline : public DeviceSolver {
   Constants c_{};
   int containers_ = 0, n_ = 0, m_ = 0;
   bool loaded_ = false;
+  bool in_use_ = false;  // what an advance left is as it left it
+  bool walls_half_placed_ = false;  // for densities, not yet for forces
   Buffer<Shape> shapes_;
   Buffer<Edge> edges_;
   Buffer<Box> boxes_;

@@ -65,8 +65,8 @@ class Backend {
   virtual BackendInfo info() const = 0;
   /// Takes scene, wall particles and state; may allocate. May be called again.
   virtual void load(const Scene&, const Walls&, const ParticleState&) = 0;
-  /// Fields at the loaded or advanced state, which stays as it is. `out` arrives as
-  /// Fields::unwritten. Where `given` holds a stage's inputs, later stages use those.
+  /// Fields at the state, after `advance` from what its next substep would use; no later run changes by it. `out`
+  /// arrives as Fields::unwritten. Where `given` holds a stage's inputs, later stages use those.
   [[nodiscard]] virtual Status evaluate(Fields& out, const StageInputs* given = nullptr) = 0;
   /// `substeps` × dt onward.
   [[nodiscard]] virtual Status advance(int substeps) = 0;

@@ -85,6 +85,20 @@ TEST_P(BackendContract, EvaluatingLeavesTheStateAlone) {
   expect_equal(state(), f.state);
 }
 
+TEST_P(BackendContract, EvaluatingOnTheWayChangesNothing) {
+  const Fixture f = test::random_fixture(4);
+  const auto run = [&](bool looks) {
+    load(f);
+    Fields out = Fields::unwritten(f.state.size(), sample_walls(f.scene).size());
+    for (const int stretch : {3, 8, 5}) {
+      EXPECT_TRUE(backend_->advance(stretch).ok());
+      for (int k = 0; looks && k < 2; ++k) EXPECT_TRUE(backend_->evaluate(out).ok());
+    }
+    return state();
+  };
+  expect_equal(run(true), run(false));
+}
+
 TEST_P(BackendContract, TwoStretchesAreOneLongOne) {
   const Fixture f = test::random_fixture(4);
   load(f);
