@@ -26,10 +26,26 @@ const std::vector<CheckDescription>& check_descriptions() {
        "A factor of 1 + 1e-5 on G or on the stiffness B."},
       {"substep",
        "Positions and velocities one substep on: integration, moving walls, contact.",
-       "tau_v = dt tau_a + 2u(|v| + dt|a|), tau_x = dt tau_v + 2u(|x| + dt|v|), and what a contact "
-       "adds (oracle/substep_answer.hpp). Where fp32 cannot tell whether a particle touches, either "
+       "tau_v = dt tau_a + 2u(|v| + dt|a|), tau_x = dt tau_v + u(2|x| + 4 dt|v|), and what contacts "
+       "make of them (oracle/contact_bounds.hpp). Where fp32 cannot tell whether a particle touches, either "
        "answer may be given, each with its own narrow tolerance.",
        "What only shows over many substeps."},
+      {"contact",
+       "What walls make of particles whose place and velocity before the contact are known to a few "
+       "roundings: one substep, and eight, of a scene without forces. Particles of the fixture that touch "
+       "a wall in the next substep, and probes around every edge and face of every container and the "
+       "floor, shallow and deep, approaching, sliding, receding, at rest, after some flight; once more "
+       "when walls move fastest, with a restitution and a friction where the scene has none.",
+       "Nothing before the contact but u(2|x| + 4 dt|v|) of the position; then what distance, normal and "
+       "wall velocity add in any legal form (oracle/contact_bounds.hpp). Probes whose nearest face fp32 "
+       "cannot tell are left out beforehand.",
+       "A friction or a restitution wrong by 1e-5."},
+      {"advanced",
+       "Neighbor counts and id sums, density, pressure and accelerations after some substeps, from what "
+       "the backend has in use then: kept lists, sorted orders, places of walls. The state is read and "
+       "the oracle answers there; the backend is not loaded again in between.",
+       "As of `fields`, at the state that was read.",
+       "What a backend keeps for its runs and does not use when it evaluates."},
       {"trajectory",
        "How far the backend is from the oracle after some tens of substeps: RMS and 99th percentile of "
        "position and velocity, and the total energy.",
@@ -52,21 +68,28 @@ const std::vector<CheckDescription>& check_descriptions() {
        "itself, or there is a floor, a distance's rounding of 8 u X deeper; elsewhere what of that exceeds "
        "the contact distance.",
        "What happens between two looks and is undone."},
+      {"determinism",
+       "Two evaluations and two runs from the same state give the same bits.",
+       "Exact: the number of values that differ is 0.",
+       "A race that did not happen this time."},
       {"conservation",
        "The forces between fluid particles add up to nothing, pressure and viscosity apart: momentum.",
        "√Σ tau_i² of the particles' own tolerances: rounding errors of different particles are "
        "independent.",
        "A factor on all forces."},
-      {"determinism",
-       "Two evaluations and two runs from the same state give the same bits.",
-       "Exact: the number of values that differ is 0.",
-       "A race that did not happen this time."},
       {"invariance",
        "Density, pressure and acceleration of the same state with its ids permuted, moved by half a "
        "meter along every axis, and turned by a quarter about z, each against the oracle's answer to "
        "the changed problem.",
        "That answer's own tolerances; moved states are rounded to fp32 first, for both sides.",
        "What is wrong in the same way everywhere."},
+      {"status",
+       "Trouble that is made on purpose, in the scene's domain, with few particles and no walls: one leaves "
+       "through each face of each free axis, two at once, one after the other; positions and velocities "
+       "that are no number or infinite, in each component. And none where there is none.",
+       "Exact: each report has the right kind, particle and substep, and no other kind. A backend may refuse "
+       "to load what is no finite number.",
+       "Capacities and missed pairs, which nobody can provoke from outside."},
   };
   return checks;
 }

@@ -1,5 +1,5 @@
 /// \file
-/// The eight checks by name, and what each compares and why its bound is what it is.
+/// The checks by name, and what each compares and why its bound is what it is.
 #pragma once
 
 #include <set>
@@ -15,8 +15,8 @@ struct CheckDescription {
   const char* blind;   // what this check cannot see
 };
 
-/// In the order in which they are made: fields, substep, trajectory, mass, containment,
-/// conservation, determinism, invariance.
+/// In the order in which they are made: fields, substep, contact, advanced, trajectory, mass, containment,
+/// determinism, conservation, invariance, status.
 const std::vector<CheckDescription>& check_descriptions();
 
 /// Names of checks that are wanted.

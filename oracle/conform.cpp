@@ -2,9 +2,11 @@
 /// What the oracle prepares, and what is asked of a backend.
 #include "oracle/conform.hpp"
 
+#include "oracle/advanced_check.hpp"
 #include "oracle/comparison.hpp"
 #include "oracle/field_checks.hpp"
 #include "oracle/run_checks.hpp"
+#include "oracle/status_check.hpp"
 #include "oracle/surroundings.hpp"
 #include "reference/error.hpp"
 #include "reference/sampling.hpp"
@@ -147,7 +149,8 @@ Judgement prepare(const Fixture& fixture, const CheckSelection& checks, int look
   const Scene& scene = fixture.scene;
   Judgement j;
   j.walls = sample_walls(scene);
-  const WallAnswer volumes = wall_answer(scene, j.walls);
+  j.volumes = wall_answer(scene, j.walls);
+  const WallAnswer& volumes = j.volumes;
   j.own = answer(scene, j.walls, volumes, fixture.state);
   require_reproduced(fixture, j.own);
   j.inputs.density = j.own.fields.density.cast<float>().cast<double>();
@@ -162,6 +165,8 @@ Judgement prepare(const Fixture& fixture, const CheckSelection& checks, int look
   }
   if (wanted({"fields"})) j.own_float = float_fields(scene, j.walls, volumes, fixture.state);
   if (wanted({"substep"})) j.substep = substep_answer(scene, fixture.state, j.own);
+  if (wanted({"contact"}))
+    j.contact = contact_problems(scene, fixture.state, j.own.fields.acceleration);
   if (wanted({"trajectory", "mass", "containment", "determinism"}))
     run_ahead(fixture, look_every, j);
   if (wanted({"invariance"}))
@@ -181,7 +186,12 @@ std::vector<CheckRow> judge(Backend& backend, const Fixture& fixture, const Judg
     backend.load(fixture.scene, oracle.walls, fixture.state);
     if (checks.count("fields")) run_fields(backend, oracle, *sheet);
     if (checks.count("substep")) run_substep(backend, fixture, oracle, *sheet);
+    if (checks.count("contact")) judge_contact(backend, oracle.walls, oracle.contact, *sheet);
+    if (checks.count("advanced"))
+      judge_advanced(backend, fixture, oracle.walls, oracle.volumes, *sheet);
     judge_runs(backend, fixture, oracle, checks, *sheet);
+    if (checks.count("status"))
+      judge_status(backend, fixture.scene, fixture.state.substep, *sheet);
   } catch (const std::exception& error) {
     if (!sheet) sheet.emplace(BackendInfo{}, fixture.name);  // it cannot even say what it is
     sheet->failed("run", error.what());

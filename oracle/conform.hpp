@@ -1,10 +1,11 @@
 /// \file
-/// One backend judged on one fixture by the eight checks of checks.hpp.
+/// One backend judged on one fixture by the checks of checks.hpp.
 #pragma once
 
 #include "oracle/audit.hpp"
 #include "oracle/backend.hpp"
 #include "oracle/checks.hpp"
+#include "oracle/contact_check.hpp"
 #include "oracle/ensemble.hpp"
 #include "oracle/fixture.hpp"
 #include "oracle/report.hpp"
@@ -28,11 +29,13 @@ struct TransformedAnswer {
 /// Everything the oracle has to say about one fixture. Made once, used for every backend.
 struct Judgement {
   Walls walls;
+  WallAnswer volumes;
   OracleAnswer own;     // every stage from the stage before
   StageInputs inputs;   // the oracle's density and pressure, rounded to fp32
   OracleAnswer given;   // accelerations from those inputs
   Fields own_float, given_float;  // the same source in sequential fp32
   SubstepAnswer substep;
+  std::vector<ContactProblem> contact;
   // The oracle's own run, as long as the fixture's ensemble is, and looked at as backends' runs are.
   std::vector<int> stretches;
   ParticleState later;

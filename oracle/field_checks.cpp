@@ -52,9 +52,26 @@ const SubstepOutcome& nearest_outcome(const std::vector<SubstepOutcome>& outcome
   return *nearest;
 }
 
-/// Positions as the images nearest to the oracle's: where fp32 cannot tell on which side of a period a
-/// particle came back in, both are the same point. One that was not put back into its period stays.
-ParticleState nearest_images(ParticleState got, const Scene& scene, const SubstepAnswer& answer) {
+}  // namespace
+
+NearestOutcomes nearest_outcomes(const std::vector<std::vector<SubstepOutcome>>& outcomes,
+                                 const ParticleState& got) {
+  const auto n = static_cast<Eigen::Index>(outcomes.size());
+  NearestOutcomes all{Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n),
+                      Eigen::Matrix3Xd(3, n)};
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const SubstepOutcome& nearest = nearest_outcome(outcomes[static_cast<std::size_t>(i)], got, i);
+    all.position.col(i) = nearest.position;
+    all.velocity.col(i) = nearest.velocity;
+    all.position_tolerance.col(i) = nearest.position_tolerance;
+    all.velocity_tolerance.col(i) = nearest.velocity_tolerance;
+  }
+  return all;
+}
+
+ParticleState nearest_images(ParticleState got, const Scene& scene,
+                             const std::vector<std::vector<SubstepOutcome>>& outcomes) {
+  if (got.position.cols() != static_cast<Eigen::Index>(outcomes.size())) return got;
   for (int a = 0; a < 3; ++a) {
     if (!scene.domain.periodic[static_cast<std::size_t>(a)]) continue;
     const double low = scene.domain.min[a], high = scene.domain.max[a], period = high - low,
@@ -62,14 +79,12 @@ ParticleState nearest_images(ParticleState got, const Scene& scene, const Subste
     for (Eigen::Index i = 0; i < got.position.cols(); ++i) {
       double& x = got.position(a, i);
       if (!(x >= low - slack && x <= high + slack)) continue;
-      const double expected = answer.outcomes[static_cast<std::size_t>(i)].front().position[a];
+      const double expected = outcomes[static_cast<std::size_t>(i)].front().position[a];
       x -= period * std::round((x - expected) / period);
     }
   }
   return got;
 }
-
-}  // namespace
 
 const Answered& all_answered() {
   static const Answered all = [] {
@@ -113,30 +128,40 @@ void judge_evaluation(const Fields& got, const Answered& answered, const Judgeme
 void judge_substep(const ParticleState& answer_of_backend, const Answered& answered, const Fixture& fixture,
                    const Judgement& oracle, Sheet& sheet) {
   const SubstepAnswer& answer = oracle.substep;
-  const auto n = static_cast<Eigen::Index>(answer.outcomes.size());
-  const ParticleState got = answer_of_backend.position.cols() == n
-                                ? nearest_images(answer_of_backend, fixture.scene, answer)
-                                : answer_of_backend;
-  Eigen::Matrix3Xd x(3, n), v(3, n), tau_x(3, n), tau_v(3, n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const SubstepOutcome& nearest =
-        nearest_outcome(answer.outcomes[static_cast<std::size_t>(i)], got, i);
-    x.col(i) = nearest.position;
-    v.col(i) = nearest.velocity;
-    tau_x.col(i) = nearest.position_tolerance;
-    tau_v.col(i) = nearest.velocity_tolerance;
-  }
+  const ParticleState got = nearest_images(answer_of_backend, fixture.scene, answer.outcomes);
+  const NearestOutcomes nearest = nearest_outcomes(answer.outcomes, got);
   // An undecidable push is no longer than a particle spacing, or than what pushes back from deep inside
   // a wall, one way or the other, and no faster than sound.
   const double apart = std::max(fixture.scene.particle_spacing, 2 * answer.longest_push);
   judge_field("substep", "position", "m", answered,
-              {flat(got.position), flat(x), flat(tau_x), {}, 3, &answer.ambiguous,
+              {flat(got.position), flat(nearest.position), flat(nearest.position_tolerance), {}, 3, &answer.ambiguous,
                answer.most_ambiguous, -infinity, apart},
               sheet);
   judge_field("substep", "velocity", "m/s", answered,
-              {flat(got.velocity), flat(v), flat(tau_v), {}, 3, &answer.ambiguous,
+              {flat(got.velocity), flat(nearest.velocity), flat(nearest.velocity_tolerance), {}, 3, &answer.ambiguous,
                answer.most_ambiguous, -infinity, fixture.scene.fluid.sound_speed},
               sheet);
+}
+
+void judge_fields(const char* check, const std::string& after, const Fields& got,
+                  const OracleAnswer& oracle, Sheet& sheet) {
+  const auto row = [&](const char* field, const char* unit) -> CheckRow& {
+    return sheet.row(check, field + after, unit);
+  };
+  for (const NeighborFact& fact : neighbor_facts) {
+    const Eigen::VectorXd expected = flat(oracle.fields.*fact.member);
+    compare({flat(got.*fact.member), expected, Eigen::VectorXd::Zero(expected.size()), {}, 1,
+             fact.of_walls ? &oracle.wall_ambiguous : &oracle.fluid_ambiguous,
+             fact.of_walls ? oracle.most_wall_ambiguous : oracle.most_fluid_ambiguous, 0.0},
+            row(fact.name, "1"));
+  }
+  for (const StageField& field : stage_fields)
+    compare({got.*field.member, oracle.fields.*field.member, oracle.tolerance.*field.member, {}},
+            row(field.name, field.unit));
+  for (const AccelerationField& field : acceleration_fields)
+    compare({flat(got.*field.member), flat(oracle.fields.*field.member),
+             flat(oracle.tolerance.*field.member), {}, 3},
+            row(field.name, "m/s^2"));
 }
 
 void judge_momentum(const Fields& got, const Answered& answered, const Fixture& fixture,

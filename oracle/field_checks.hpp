@@ -69,11 +69,30 @@ void judge_staged(const Fields& got, const Answered& answered, const Judgement& 
 void judge_evaluation(const Fields& got, const Answered& answered, const Judgement& oracle,
                       Sheet& sheet);
 
+/// What particles may be, each in the outcome that position and velocity together are nearest to, by score.
+struct NearestOutcomes {
+  Eigen::Matrix3Xd position, velocity;                      // 3×N, m, m/s
+  Eigen::Matrix3Xd position_tolerance, velocity_tolerance;  // 3×N, m, m/s
+};
+/// \param outcomes  per particle at least one; \param got  of another number of particles: the first ones
+NearestOutcomes nearest_outcomes(const std::vector<std::vector<SubstepOutcome>>& outcomes,
+                                 const ParticleState& got);
+
+/// Positions as the images nearest to the first outcomes: where fp32 cannot tell on which side of a period a
+/// particle came back in, both are the same point. One that was not put back into its period stays.
+ParticleState nearest_images(ParticleState got, const Scene& scene,
+                             const std::vector<std::vector<SubstepOutcome>>& outcomes);
+
 /// Row `substep`. Position and velocity, as far as answered, are held together to the outcome that
 /// they are nearest to.
 /// \param got  one substep after the fixture's state, in id order
 void judge_substep(const ParticleState& got, const Answered& answered, const Fixture& fixture,
                    const Judgement& oracle, Sheet& sheet);
+
+/// Rows of neighbor facts, density, pressure and accelerations against the oracle's answer at the same
+/// state. \param after  follows each field's name, as in "density after 3"
+void judge_fields(const char* check, const std::string& after, const Fields& got,
+                  const OracleAnswer& oracle, Sheet& sheet);
 
 /// Row `conservation`: what the parts of `judge_staged` that act between fluid particles add up to.
 void judge_momentum(const Fields& got, const Answered& answered, const Fixture& fixture,

@@ -27,10 +27,8 @@ struct SubstepAnswer {
   double longest_push = 0;
 };
 
-/// tau_v = dt tau_a + 2u(|v| + dt|a|), tau_x = dt tau_v + 2u(|x| + dt|v|), and at every contact
-/// tau_x += (phi_c − phi)(tau_n + 2u) + 2u|x| + e, tau_v += 2|w| tau_n + 2|omega| tau_x: e the error of the
-/// distance (pose rounding and tau_x), tau_n how far the normal turns within e, w the velocity
-/// relative to the wall.
+/// tau_v = dt tau_a + 2u (|v| + dt|a|), tau_x = dt tau_v + u (2|x| + 4 dt|v|), and what contacts make of
+/// them (contact_bounds.hpp).
 /// \param fields  the oracle's answer at `state`
 SubstepAnswer substep_answer(const Scene& scene, const ParticleState& state,
                              const OracleAnswer& fields);

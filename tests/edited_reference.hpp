@@ -33,6 +33,8 @@ class EditedReference : public Backend {
   }
 
   Status evaluate(Fields& out, const StageInputs* given) override {
+    // Cells cannot be found for a position that is no number.
+    if (const Status status = trouble(); status.bits & Status::non_finite) return status;
     const PosedWalls posed = pose_walls(scene_, walls_, scene_.time_at(state_.substep));
     Eigen::VectorXd volumes = boundary_volumes<double>(scene_, walls_);
     Neighbors near;
@@ -46,6 +48,10 @@ class EditedReference : public Backend {
   Status advance(int substeps) override {
     const std::vector<SolidDistance> solids(scene_.containers.begin(), scene_.containers.end());
     Fields fields;
+    if (Status status = trouble(); status.bits & Status::non_finite) {
+      ++status.substep;
+      return status;
+    }
     for (int k = 0; k < substeps; ++k) {
       (void)evaluate(fields, nullptr);
       const double dt = scene_.time_step();
@@ -53,6 +59,7 @@ class EditedReference : public Backend {
       state_.position += dt * state_.velocity;
       ++state_.substep;
       collide(scene_, solids, scene_.time_at(state_.substep), state_);
+      if (const Status status = trouble(); !status.ok()) return status;
       edit_.advanced(state_);
     }
     return {};
@@ -63,6 +70,18 @@ class EditedReference : public Backend {
   NeighborStats neighbor_stats() const override { return {}; }
 
  private:
+  /// Of the solver itself: what an edit makes of its results is for checks to find.
+  Status trouble() const {
+    for (Eigen::Index i = 0; i < state_.size(); ++i) {
+      if (!state_.position.col(i).allFinite() || !state_.velocity.col(i).allFinite())
+        return {Status::non_finite, i, state_.substep};
+      if ((state_.position.col(i).array() < scene_.domain.min.array()).any() ||
+          (state_.position.col(i).array() > scene_.domain.max.array()).any())
+        return {Status::escaped, i, state_.substep};
+    }
+    return {};
+  }
+
   Edit edit_;
   Scene scene_;
   Walls walls_;

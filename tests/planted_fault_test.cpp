@@ -149,6 +149,17 @@ const Fault catalogue[] = {
     {"ContactCloserByAPercent", "substep", "position",
      scene_edit([](Scene& s) { s.contact.distance_ratio *= 0.99; })},
     {"NoFriction", "substep", "velocity", scene_edit([](Scene& s) { s.contact.friction = 0; })},
+    {"FrictionOffByAThousandth", "contact", "velocity",
+     scene_edit([](Scene& s) { s.contact.friction *= 1.001; })},
+    {"RestitutionOffByAThousandth", "contact", "velocity",
+     scene_edit([](Scene& s) { s.contact.restitution *= 1.001; })},
+    {"NeighborLostInARun", "advanced", "fluid_neighbor_count after 17", [] {
+       Edit edit;
+       edit.found = [searches = 0](const Scene&, Neighbors& n, Eigen::VectorXd&) mutable {
+         if (++searches > 5) longest(n.fluid).pop_back();
+       };
+       return edit;
+     }()},
     {"StateSwapped", "substep", "position",
      result_edit([](ParticleState& s) { s.position.col(1).swap(s.position.col(2)); })},
     {"StateNan", "substep", "velocity",

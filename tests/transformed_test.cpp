@@ -29,7 +29,7 @@ TEST(Transformed, ProblemsHaveTheAnswersOfTheProblem) {
 }
 
 TEST(Checks, AreChosenByName) {
-  EXPECT_EQ(all_checks().size(), 8u);
+  EXPECT_EQ(all_checks().size(), 11u);
   EXPECT_EQ(parse_checks({"mass", "fields"}), (CheckSelection{"fields", "mass"}));
   try {
     parse_checks({"mas"});

@@ -45,8 +45,8 @@ constexpr const char* footer =
     "Without FIXTURE the small recordings beside the binary are judged (or those in the folder "
     "that\n"
     "DECANT_FIXTURES names), with --all every one. A check passes where no error exceeds its own\n"
-    "tolerance: score = largest |error| / tolerance <= 1. Checks: fields, substep, trajectory, mass,\n"
-    "containment, conservation, determinism, invariance.\n"
+    "tolerance: score = largest |error| / tolerance <= 1. Checks: fields, substep, contact, advanced,\n"
+    "trajectory, mass, containment, determinism, conservation, invariance, status.\n"
     "Exit status: 0 all pass, 1 something does not conform, 2 bad input, 3 something could not "
     "run\n"
     "(a backend that breaks down while it is judged does not conform),\n"
@@ -324,7 +324,7 @@ void add_conform_command(CLI::App& app, int& exit_status) {
       ->delimiter(',')
       ->allow_extra_args(false);
   verb->add_option("--executor", arguments->executor, "auto, cuda or host")->capture_default_str();
-  verb->add_option("--check", arguments->checks, "fields,substep,…; default: all eight")
+  verb->add_option("--check", arguments->checks, "fields,substep,…; default: all")
       ->delimiter(',')
       ->allow_extra_args(false);
   verb->add_option("--explain", arguments->explain,

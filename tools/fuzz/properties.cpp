@@ -21,16 +21,16 @@ namespace decant::fuzz {
 namespace {
 
 /// The checks of `conform` that are properties as they are.
-const std::set<std::string> checked = {"fields",       "substep",     "trajectory",
-                                       "mass",         "containment", "conservation",
-                                       "determinism",  "invariance"};
+const std::set<std::string> checked = {"fields",      "substep",      "contact",     "advanced",
+                                       "trajectory",  "mass",         "containment", "conservation",
+                                       "determinism", "invariance",   "status"};
 
 Outcome failed(const std::string& backend, const char* property, std::string reason) {
   return {backend, property, false, 0, "", std::move(reason)};
 }
 
 /// Those that run more than one substep.
-constexpr std::array runs = {"trajectory",  "sequence",    "mass",
+constexpr std::array runs = {"advanced",    "trajectory",  "sequence",    "mass",
                              "containment", "determinism", "lists"};
 
 /// The property's rows, joined to the worst.
@@ -196,6 +196,8 @@ const std::vector<Property>& properties() {
   static const std::vector<Property> all = {
       {"fields", "every field of every particle is the oracle's, within its tolerance", 1, true},
       {"substep", "one substep moves every particle as the oracle moves it", 1, true},
+      {"contact", "walls push and rub as the oracle's do, whatever led to the contact", 2, true},
+      {"advanced", "fields of what a run leaves in use are the oracle's at the state it ends in", 2, true},
       {"conservation", "forces between fluid particles add up to nothing", 1, true},
       {"mass", "every particle is there once, finite, in one place", 4, true},
       {"containment", "no particle gets deeper into a wall than the oracle's own run shows", 4, true},
@@ -203,6 +205,7 @@ const std::vector<Property>& properties() {
       {"invariance", "ids permuted, everything moved, everything turned: the same answer", 4, true},
       {"trajectory", "a short run ends where the oracle's ends, as near as rounding lets runs end", 8,
        true},
+      {"status", "trouble that is made is reported, with its particle and substep", 8, true},
       {"sequence", "parts of a run, looks and loads in between, end where one run ends", 8, true},
       {"lists", "a list that rebuilds by displacement misses no pair at any substep", 4, true},
       {"round-trip", "a scene comes back from its file as it was", 1, false},

@@ -1,0 +1,122 @@
+/// \file
+/// Push-out and response as in reference/solver.cpp, with what fp32 can make of them.
+#include "oracle/contact_bounds.hpp"
+
+#include "oracle/tolerance.hpp"
+#include "reference/solver.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace decant {
+namespace {
+
+constexpr double u = unit_roundoff;
+
+bool turns(const Pose& pose) {
+  return !pose.rotation.isIdentity(0) || pose.pivot != Vec3::Zero() ||
+         pose.angular_velocity != Vec3::Zero();
+}
+
+/// How far the normal turns when the point moves by up to `e` in any direction. Twice as far along each
+/// axis is farther than e along every direction, as 2 > √3.
+double turn_of_normal(const SolidDistance& solid, const Vec3& local, const Vec3& normal, double e) {
+  double turn = 0;
+  for (int a = 0; a < 3; ++a)
+    for (double side : {-2.0, 2.0})
+      turn = std::max(turn, (solid.at(local + side * e * Vec3::Unit(a)).normal - normal).norm());
+  return turn;
+}
+
+}  // namespace
+
+bool BoundedParticle::touches(double distance, double reach, double e) {
+  const bool touching = distance < reach;
+  if (!(std::abs(distance - reach) <= e)) return touching;
+  const unsigned bit = 1u << std::min(undecided++, 31);
+  return touching != ((flips & bit) != 0);
+}
+
+ContactBounds::ContactBounds(const Scene& scene)
+    : scene_(scene), solids_(scene.containers.begin(), scene.containers.end()) {}
+
+std::vector<Pose> ContactBounds::poses_at(double time) const {
+  std::vector<Pose> poses;
+  for (const auto& c : scene_.containers) poses.push_back(pose_at(c, time));
+  return poses;
+}
+
+void ContactBounds::accelerate(const Vec3& a, const Vec3& tau_a, BoundedParticle& p) const {
+  const double dt = scene_.time_step();
+  p.tau_v += dt * tau_a + 2 * u * (p.v.cwiseAbs() + dt * a.cwiseAbs());
+  p.v += dt * a;
+}
+
+void ContactBounds::fly(BoundedParticle& p) const {
+  const double dt = scene_.time_step();
+  p.tau_x += dt * p.tau_v + u * (2 * p.x.cwiseAbs() + 4 * dt * p.v.cwiseAbs());
+  p.x += dt * p.v;
+  for (int c = 0; c < 3; ++c) {
+    if (!scene_.domain.periodic[static_cast<std::size_t>(c)]) continue;
+    const double low = scene_.domain.min[c], period = scene_.domain.max[c] - low;
+    p.tau_x[c] += 4 * u * (period + std::abs(low));
+    p.x[c] -= period * std::floor((p.x[c] - low) / period);
+  }
+}
+
+void ContactBounds::respond(double distance, const Vec3& normal, const Pose& pose, double epsilon,
+                            double tau_n, BoundedParticle& p) const {
+  const double reach = scene_.contact_distance(), way = std::max(0.0, reach - distance);
+  const Vec3 v = p.v;
+  // Also where the oracle's own distance is not within reach.
+  push_out(scene_, std::min(distance, std::nextafter(reach, 0.0)), normal, pose, p.x, p.v);
+  p.pushed += way;
+  p.tau_x = (p.tau_x.norm() + epsilon + way * (tau_n + 2 * u)) * Vec3::Ones() + 2 * u * p.x.cwiseAbs();
+
+  const Vec3 wall = pose.velocity_at(p.x), w = v - wall;
+  const double tau_wall =
+      pose.angular_velocity.norm() *
+          (p.tau_x.norm() +
+           4 * u * (p.x.norm() + pose.pivot.norm() + (p.x - pose.pivot).norm())) +
+      3 * u * (pose.linear_velocity.norm() + pose.surface_velocity.norm() + wall.norm());
+  const double tau_v = p.tau_v.norm();
+  if (w.dot(normal) > tau_v + tau_wall + w.norm() * (tau_n + 5 * u)) return;
+  const double e = scene_.contact.restitution, k = (1 + e) * scene_.contact.friction;
+  p.tau_v = ((1 + k) * tau_v + (2 + k) * tau_wall + (2 + 2 * e + k) * w.norm() * tau_n +
+             8 * u * (1 + e + k) * w.norm() + 4 * u * (wall.norm() + p.v.norm())) *
+            Vec3::Ones();
+}
+
+void ContactBounds::contact(const SolidDistance& solid, const Pose& pose, BoundedParticle& p) const {
+  const double reach = scene_.contact_distance();
+  for (int projection = 0; projection < 2; ++projection) {
+    const Vec3 local = pose.to_local(p.x);
+    double epsilon = u * (2 * pose.translation.norm() + 16 * local.norm());
+    if (turns(pose))
+      epsilon += u * (pose.pivot.norm() + 8 * (p.x - pose.pivot).norm() +
+                      (pose.translation - pose.pivot).norm());
+    const double e = p.tau_x.norm() + epsilon;
+    if (!solid.may_be_within(reach + e, local)) return;
+    const SurfaceDistance surface = solid.at(local);
+    if (!p.touches(surface.distance, reach, e)) return;
+    double tau_n = turn_of_normal(solid, local, surface.normal, e) + 4 * u +
+                   4 * u * local.norm() / std::abs(surface.distance);
+    if (turns(pose)) tau_n += 8 * u;
+    if (!(tau_n <= 0.1)) {
+      p.ambiguous = true;
+      tau_n = 2;
+    }
+    respond(surface.distance, pose.rotation * surface.normal, pose, epsilon, tau_n, p);
+  }
+}
+
+void ContactBounds::collide(const std::vector<Pose>& poses, BoundedParticle& p) const {
+  for (std::size_t c = 0; c < solids_.size(); ++c) contact(solids_[c], poses[c], p);
+  if (!scene_.floor) return;
+  const double height = p.x.z() - scene_.floor->height;
+  const double epsilon = 4 * u * (std::abs(p.x.z()) + std::abs(scene_.floor->height));
+  if (p.touches(height, scene_.contact_distance(), p.tau_x.z() + epsilon))
+    respond(height, Vec3::UnitZ(), Pose{}, epsilon, 0, p);
+}
+
+}  // namespace decant
