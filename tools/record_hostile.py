@@ -149,6 +149,25 @@ def states(rng):
     lattice = np.stack(np.meshgrid(*[np.arange(-4, 4)] * 3), -1).reshape(-1, 3)
     yield "exact-support", "hostile-exact", lattice * 2.0**-8
 
+    # Beside the wall of a turning cup, just beyond its reach.
+    beside = np.stack(np.meshgrid(np.arange(5), np.arange(6), np.arange(6)), -1).reshape(-1, 3)
+    beside = (beside + rng.uniform(-0.2, 0.2, beside.shape)) * 0.004 + [0.044, -0.01, -0.01]
+    yield "fast-wall", "hostile-fast-wall", beside
+
+    ball = np.stack(np.meshgrid(*[np.arange(-5, 6)] * 3), -1).reshape(-1, 3)
+    ball = ball[np.sum(ball**2, axis=1) <= 25]
+    yield "gathering", "hostile-gathering", (ball + rng.uniform(-0.15, 0.15, ball.shape)) * 0.0046
+
+
+def motion(name, scene, position):
+    """(velocity, time) of a state."""
+    if name == "fast-wall":
+        return np.zeros_like(position), 0.0122
+    if name == "gathering":
+        return -105.0 * position, 0.0
+    velocity = np.random.default_rng(7).uniform(-0.2, 0.2, position.shape)
+    return velocity, 0.2 if scene == "hostile-cup" else 0.0
+
 
 def main():
     p = argparse.ArgumentParser(description=__doc__)
@@ -163,7 +182,7 @@ def main():
     for name, scene, time, position in problems:
         if a.only and name not in a.only:
             continue
-        velocity = np.random.default_rng(7).uniform(-0.2, 0.2, position.shape)
+        velocity, time = motion(name, scene, position)
         with tempfile.TemporaryDirectory() as folder:
             state = Path(folder) / f"{name}.h5"
             with h5py.File(state, "w", libver="v108") as f:
