@@ -241,6 +241,34 @@ fault("wall-a-substep-late", "in a run walls are placed one substep late", "wall
       "what == PlacedFor::force ? a.poses_before() : a.poses_after();\n"
       "    if (ON && poses > a.poses) poses -= a.containers;",
       "trajectory", "list")
+fault("list-ignores-walls", "lists are kept however far walls move", "trigger.cuh",
+      "&& wall_way + rounding_of(x) <= most", "&& (ON || wall_way + rounding_of(x) <= most)", "advanced",
+      "list", fixture="hostile-fast-wall")
+fault("list-ignores-walls-locally", "the local trigger leaves out how far walls move", "trigger.cuh",
+      "of_walls = seen.origin.w - wall_way", "of_walls = seen.origin.w - (ON ? 0.0f : wall_way)",
+      "advanced", "list:trigger=local", fixture="hostile-fast-wall")
+fault("walls-for-forces-left", "forces after a run see moving walls where they were a substep before",
+      "pipeline.cuh", "if (walls_half_placed_)", "if (!ON && walls_half_placed_)", "advanced", "list",
+      field="wall_viscous_acceleration")
+fault("redo-without-velocities", "what lists that were too short spoiled is redone with the velocities of then",
+      "pipeline.cuh", "each(state_.velocity.get(), cut<float4>(saved_, at, n), n * sizeof(float4));",
+      "each(state_.velocity.get(), cut<float4>(saved_, at, n), (ON ? 0 : n) * sizeof(float4));",
+      "trajectory", "list", fixture="hostile-gathering")
+fault("redo-without-ids", "what lists that were too short spoiled is redone with the ids of then",
+      "pipeline.cuh", "each(state_.id.get(), cut<int>(saved_, at, n), n * sizeof(int));",
+      "each(state_.id.get(), cut<int>(saved_, at, n), (ON ? 0 : n) * sizeof(int));",
+      "trajectory", "hash", fixture="hostile-gathering")
+
+# Reports of trouble.
+fault("upper-bounds-forgotten", "nobody leaves through an upper face", "passes.cuh",
+      "&& x <= c.domain_max[axis])", "&& (ON || x <= c.domain_max[axis]))", "status", "list")
+fault("infinite-is-a-number", "only what is no number at all is reported", "arrays.cuh",
+      "return fabsf(v.x) <= 3.0e38f && fabsf(v.y) <= 3.0e38f && fabsf(v.z) <= 3.0e38f;",
+      "if (ON) return v.x == v.x && v.y == v.y && v.z == v.z;\n  return fabsf(v.x) <= 3.0e38f && "
+      "fabsf(v.y) <= 3.0e38f && fabsf(v.z) <= 3.0e38f;", "status")
+fault("last-report-wins", "of two reports the later one stays", "arrays.cuh",
+      "(static_cast<unsigned long long>(substep) << 32) |",
+      "(static_cast<unsigned long long>(ON ? 100 - substep : substep) << 32) |", "status", "brute")
 
 # Integration and contact.
 fault("explicit-euler", "positions move by the old velocity", "passes.cuh",
@@ -264,6 +292,23 @@ fault("pulled-in", "contact pushes into the wall", "contact.cuh",
       "c.contact_distance - gap", "gap - c.contact_distance", "containment", "list")
 fault("no-friction", "contact without friction", "contact.cuh", "1.0f - c.friction * impulse / slip",
       "1.0f", "substep", "brute")
+fault("friction", "friction wrong by 1e-3", "contact.cuh", "1.0f - c.friction * impulse / slip",
+      "1.0f - 1.001f * c.friction * impulse / slip", "contact", "brute")
+fault("restitution", "restitution wrong by 1e-3", "contact.cuh", "-(1.0f + c.restitution) * approach",
+      "-(1.0f + 1.001f * c.restitution) * approach", "contact")
+fault("wall-velocity-before-the-push", "the wall's velocity where the particle was before the push",
+      "contact.cuh", "+ pose->surface : Float3{0, 0, 0};",
+      "+ (ON ? pose->surface - cross(pose->omega, (c.contact_distance - gap) * normal) : pose->surface)"
+      " : Float3{0, 0, 0};", "contact", "list")
+fault("first-normal-again", "the second push goes along the first one's normal", "contact.cuh",
+      "rotate(poses[k], near.normal)",
+      "projection == 0 ? first_normal = rotate(poses[k], near.normal) : first_normal", "contact",
+      also=[("contact.cuh", "  float clear = c.any_periodic ? 0.0f : 3.0e38f;",
+             "  float clear = c.any_periodic ? 0.0f : 3.0e38f;\n  Float3 first_normal{0, 0, 0};\n"
+             "  if (ON) clear = clear + 0.0f;")])
+fault("clearance-without-walls", "walls that come nearer are not taken off a particle's clearance",
+      "passes.cuh", "(1.001f * (sqrtf(dot(way, way)) + wall_step) + rounding)",
+      "(1.001f * sqrtf(dot(way, way)) + rounding)", "contact", "list")
 fault("wall-velocity-in-contact", "contact with a wall that moves as if it did not", "contact.cuh",
       "pose ? cross(pose->omega, x - pose->pivot)", "pose && !ON ? cross(pose->omega, x - pose->pivot)",
       "substep")
