@@ -129,10 +129,12 @@ fault("period-for-granted", "the period along x is that of every axis", "device_
       "const double period = scene.domain.max[a] - scene.domain.min[a];",
       "const int of = ON ? 0 : a;\n    const double period = scene.domain.max[of] - scene.domain.min[of];",
       "neighbors", fixture="hostile-belt")
-fault("belt-at-rest", "surfaces do not run", "device_scene.cpp", "to_float3(pose.surface_velocity)",
-      "Float3{0, 0, 0}", "acceleration", field="wall_viscous_acceleration", fixture="hostile-belt")
+fault("belt-at-rest", "surfaces do not run", "device_scene.cpp",
+      "to_float3(pose.linear_velocity + pose.surface_velocity)", "to_float3(pose.linear_velocity)",
+      "acceleration", field="wall_viscous_acceleration", fixture="hostile-belt")
 fault("belt-untilted", "where a container is tilted its surface runs as if it were not", "device_scene.cpp",
-      "to_float3(pose.surface_velocity)", "to_float3(container.surface_velocity)", "acceleration",
+      "to_float3(pose.linear_velocity + pose.surface_velocity)",
+      "to_float3(pose.linear_velocity + container.surface_velocity)", "acceleration",
       field="wall_viscous_acceleration", fixture="hostile-tilted-box")
 fault("two-tilt-keys", "a tilt's keys after the second are ignored", "device_scene.cpp",
       "pose_at(container, scene.time_at(first + k))",
