@@ -3,11 +3,13 @@
 #include "oracle/named_fields.hpp"
 
 #include "oracle/hdf5_io.hpp"
+#include "oracle/sum_bound.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <tuple>
 
@@ -101,7 +103,7 @@ struct State {
   }
 };
 
-/// (√n + c) u C of every value; empty where the field has no condition sum.
+/// (√n + c) (u + 2⁻⁵³) C of every value; empty where the field has no condition sum.
 Eigen::VectorXd derived_tolerance(const State& oracle, const std::string& name, int components) {
   const Hdf5Reader& in = oracle.in;
   const std::string path = oracle.path + "/condition/" + name;
@@ -130,8 +132,15 @@ Eigen::VectorXd derived_tolerance(const State& oracle, const std::string& name, 
   }
   Eigen::VectorXd tolerance(sums.values.size());
   for (Eigen::Index k = 0; k < tolerance.size(); ++k)
-    tolerance[k] = (std::sqrt(terms[k / components]) + c) * u * sums.values[k];
+    tolerance[k] = (std::sqrt(terms[k / components]) + c) * (u + reference_roundoff) * sums.values[k];
   return tolerance;
+}
+
+/// √(Σx²/count), also where squares overflow.
+double root_mean_square(const Eigen::VectorXd& values) {
+  const double largest = values.size() ? values.cwiseAbs().maxCoeff() : 0;
+  if (!(largest > 0)) return largest;
+  return largest * std::sqrt((values / largest).squaredNorm() / static_cast<double>(values.size()));
 }
 
 /// tau of every value, or empty where the reference states nothing to judge by.
@@ -145,8 +154,12 @@ Eigen::VectorXd tolerance_of(const State& oracle, const std::string& name,
     if (!absolute && !relative && !field.integers) return {};
     tolerance.setZero(field.values.size());
   }
-  const double rms = std::sqrt(field.values.squaredNorm() / static_cast<double>(tolerance.size()));
-  tolerance.array() += absolute.value_or(0) + relative.value_or(0) * rms;
+  tolerance.array() += absolute.value_or(0) + relative.value_or(0) * root_mean_square(field.values);
+  for (Eigen::Index k = 0; k < tolerance.size(); ++k)
+    if (!std::isfinite(tolerance[k]))
+      oracle.in.fail(path, fmt::format("a tolerance beyond {:.3g} at {}",
+                                       std::numeric_limits<double>::max(), k),
+                     "values and condition sums whose tolerance is a finite double");
   return tolerance;
 }
 

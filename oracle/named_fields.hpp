@@ -3,10 +3,10 @@
 /// on states of theirs. Tolerances come from the reference's file alone, so that a port cannot
 /// widen its own. The files' layout is in results-format.md.
 ///
-///   tau = (√n + c) u C + a + r · RMS
+///   tau = (√n + c) (u + 2⁻⁵³) C + a + r · RMS
 ///
-/// by value: C the condition sum Σ|t|(1 + κ) and n the number of its terms (tolerance.hpp), c and u
-/// of the field; a and r the stated absolute and relative tolerance, RMS = √(Σx²/count) of the
+/// by value: C the condition sum Σ|t|(1 + κ) and n the number of its terms (tolerances.md), c and u of the
+/// port, 2⁻⁵³ of the reference's own sums; a and r the stated absolute and relative tolerance, RMS = √(Σx²/count) of the
 /// reference's whole field. What is not stated is 0; where neither C nor a nor r is stated there is
 /// nothing to judge by, and the field is not_run. Integers need no tolerance: without one they are
 /// exact.

@@ -3,6 +3,9 @@
 /// the oracle's own; the passes mirror the formulas in tolerance.hpp.
 #include "oracle/tolerance.hpp"
 
+#include "oracle/force_bounds.hpp"
+#include "oracle/pose_error.hpp"
+#include "oracle/sum_bound.hpp"
 #include "reference/kernel.hpp"
 #include "reference/pair_terms.hpp"
 #include "reference/pose.hpp"
@@ -14,66 +17,41 @@
 namespace decant {
 namespace {
 
-constexpr double u = unit_roundoff;
+constexpr double u = both_roundoffs;
 
-double growth(std::size_t terms, double c) {
-  return (std::sqrt(static_cast<double>(terms)) + c) * u;
-}
-
-/// X_b of every wall particle, m.
-Eigen::VectorXd pose_magnitudes(const Scene& scene, const Walls& walls, const PosedWalls& posed,
-                                double time) {
-  Eigen::VectorXd X(walls.size());
-  Eigen::Index b = 0;
-  for (std::size_t c = 0; c < walls.containers.size(); ++c) {
-    const Pose pose = pose_at(scene.containers[c], time);
-    const auto& local = walls.containers[c].position;
-    for (Eigen::Index k = 0; k < local.cols(); ++k, ++b)
-      X[b] = std::max({posed.position.col(b).cwiseAbs().maxCoeff(), local.col(k).norm(),
-                       pose.translation.cwiseAbs().maxCoeff()});
-  }
-  return X;
+/// How far r = |x| is off where its components are off by e: e · |x|/|x|, m.
+double along(const Vec3& x, double r, const Vec3& e) {
+  if (e.x() == 0 && e.y() == 0 && e.z() == 0) return 0;
+  return r > 0 ? x.cwiseAbs().dot(e) / r : e.norm();
 }
 
 Eigen::VectorXd volume_tolerances(const Scene& scene, const WallNeighbors& neighbors,
                                   const Eigen::VectorXd& volumes) {
   const Kernel<double> kernel(scene.kernel, scene.support_radius());
   const Separation separation(scene.domain);
+  const double H = scene.support_radius();
+  const double own = of_density_term - 1 + CommonRoundings(scene.kernel).W;  // no mass
   const Eigen::Matrix3Xd& x = neighbors.position;
   Eigen::VectorXd tolerance(x.cols());
+  SumBound sum;
+  CellCounter cells;
   for (Eigen::Index b = 0; b < x.cols(); ++b) {
     const auto& near = neighbors.near[static_cast<std::size_t>(b)];
-    double sum = kernel.W(0);
+    sum.clear();
+    sum.add(kernel.W(0));
+    double inside = own * kernel.W(0), by_H = -3 * kernel.W(0);
     for (const auto k : near) {
-      const double r = separation(Vec3(x.col(b)), Vec3(x.col(k))).norm();
-      sum += kernel.W(r) + r * kernel.slope_W(r);
+      const Vec3 x_b = x.col(b), x_k = x.col(k), x_bk = separation(x_b, x_k);
+      const double r = x_bk.norm(), W = kernel.W(r), slope = kernel.slope_W(r);
+      sum.add(W);
+      by_H += r * slope - 3 * W;
+      inside += own * W + of_distance * r * slope +
+                slope * along(x_bk, r, pair_error(x_b, x_k, x_bk, H, 1.0));
     }
-    tolerance[b] = volumes[b] * volumes[b] * growth(near.size() + 1, 6) * sum + 2 * u * volumes[b];
+    tolerance[b] = volumes[b] * volumes[b] * sum.error(u, u * (inside + std::abs(by_H)), cells) + 2 * u * volumes[b];
   }
   return tolerance;
 }
-
-/// What the accelerations' tolerances are made of, for one particle, by component.
-struct ForceBounds {
-  Vec3 condition = Vec3::Zero();  // Σ |t|(1 + κ)
-  Vec3 pose = Vec3::Zero();       // Σ |∂t/∂x_b| X_b
-  Vec3 inputs = Vec3::Zero();     // from tau(V_b) and, for viscosity, tau_rho
-  Vec3 squares = Vec3::Zero();    // Σ (m tau_q,j G x_c)²
-  Vec3 gradient = Vec3::Zero();   // Σ m G x_c or Σ rho0 V_b G x_c, signed
-
-  Vec3 tolerance(double growth_factor, double tau_q) const {
-    return growth_factor * (condition + pose) + inputs + squares.cwiseSqrt() +
-           2 * tau_q * gradient.cwiseAbs();
-  }
-  ForceBounds& operator+=(const ForceBounds& o) {
-    condition += o.condition;
-    pose += o.pose;
-    inputs += o.inputs;
-    squares += o.squares;
-    gradient += o.gradient;
-    return *this;
-  }
-};
 
 class Bounds {
  public:
@@ -82,10 +60,12 @@ class Bounds {
       : scene_(scene),
         state_(state),
         given_(given),
-        kernel_(scene.kernel, scene.support_radius()),
+        H_(scene.support_radius()),
+        kernel_(scene.kernel, H_),
         separation_(scene.domain),
         posed_(pose_walls(scene, walls, scene.time_at(state.substep))),
-        X_(pose_magnitudes(scene, walls, posed_, scene.time_at(state.substep))) {
+        pose_(pose_errors(scene, walls, posed_, scene.time_at(state.substep), u)),
+        common_(scene.kernel) {
     OracleAnswer& a = answer_;
     find_neighbors(scene, state.position, posed_.position, NeighborSearch::cells, near_);
     evaluate<double>(scene, state, posed_, volumes.volume, near_, a.fields, given);
@@ -96,7 +76,6 @@ class Bounds {
     a.tolerance.boundary_volume = volumes.tolerance;
     ambiguous_pairs();
     density_and_pressure();
-    wall_velocity_error(walls);
     accelerations();
   }
 
@@ -110,30 +89,43 @@ class Bounds {
 
   void density_and_pressure() {
     const double m = scene_.particle_mass(), rho0 = scene_.fluid.rest_density;
-    const double gamma = scene_.fluid.eos_exponent, B = scene_.eos_stiffness();
-    const double c0 = scene_.fluid.sound_speed;
+    const double own = of_density_term + of_mass + common_.W;
+    const double own_of_wall = of_density_term + of_wall_factors + common_.W;
     const auto n = state_.size();
     const auto& V = answer_.fields.boundary_volume;
     auto& C = answer_.condition;
     C.density.setZero(n);
     C.density_pose.setZero(n);
     tau_q_.setZero(n);
+    SumBound terms;
     for (Eigen::Index i = 0; i < n; ++i) {
       const Vec3 x_i = state_.position.col(i);
       const auto& fluid = near_.fluid[static_cast<std::size_t>(i)];
       const auto& wall = near_.wall[static_cast<std::size_t>(i)];
-      double sum = m * kernel_.W(0), pose = 0, from_volumes = 0;
+      terms.clear();
+      const double self = m * kernel_.W(0);
+      terms.add(self);
+      double sum = self, inside = own * self, by_H = -3 * self, pose = 0, misplaced = 0, from_volumes = 0;
       for (const auto j : fluid) {
         const Vec3 x_j = state_.position.col(j), x_ij = separation_(x_i, x_j);
-        const double r = x_ij.norm(), slope = kernel_.slope_W(r);
-        sum += m * (kernel_.W(r) + r * slope);
-        pose += m * slope * image_magnitude(x_i, x_j, x_ij);
+        const double r = x_ij.norm(), t = m * kernel_.W(r), slope = m * kernel_.slope_W(r);
+        terms.add(t);
+        sum += t + r * slope;
+        inside += own * t + of_distance * r * slope;
+        by_H += r * slope - 3 * t;
+        pose += slope * image_magnitude(x_i, x_j, x_ij);
+        misplaced += slope * along(x_ij, r, pair_error(x_i, x_j, x_ij, H_, u));
       }
       for (const auto b : wall) {
         const Vec3 x_b = posed_.position.col(b), x_ib = separation_(x_i, x_b);
-        const double r = x_ib.norm(), W = kernel_.W(r), slope = kernel_.slope_W(r);
-        sum += rho0 * V[b] * (W + r * slope);
-        pose += rho0 * V[b] * slope * std::max(X_[b], image_magnitude(x_i, x_b, x_ib));
+        const double r = x_ib.norm(), W = kernel_.W(r);
+        const double t = rho0 * V[b] * W, slope = rho0 * V[b] * kernel_.slope_W(r);
+        terms.add(t);
+        sum += t + r * slope;
+        inside += own_of_wall * t + of_distance * r * slope;
+        by_H += r * slope - 3 * t;
+        pose += slope * std::max(pose_.largest[b], image_magnitude(x_i, x_b, x_ib));
+        misplaced += slope * along(x_ib, r, wall_error(b, x_i, x_b, x_ib));
         from_volumes += rho0 * answer_.tolerance.boundary_volume[b] * W;
       }
       // A pair that fp32 may place inside H has a term no larger than that of its nearest place.
@@ -144,37 +136,36 @@ class Bounds {
       C.density[i] = sum;
       C.density_pose[i] = pose;
       answer_.tolerance.density[i] =
-          growth(fluid.size() + wall.size() + 1, 6) * (sum + pose) + from_volumes + from_edge;
-
-      // Pressure follows from the backend's own density unless density is given.
-      const bool rho_given = given_ && given_->density.size();
-      const double rho = rho_given ? given_->density[i] : answer_.fields.density[i];
-      const double tau_rho = rho_given ? 0.0 : answer_.tolerance.density[i];
-      const double compression = rho / rho0;
-      const double unclamped = B * (std::pow(compression, gamma) - 1);
-      double tau_p = c0 * c0 * std::pow(compression, gamma - 1) * tau_rho +
-                     20 * u * B * std::pow(compression, gamma) + 3 * u * std::max(-unclamped, 0.0);
-      if (!scene_.fluid.allow_tension && unclamped + tau_p < 0) tau_p = 0;
-      answer_.tolerance.pressure[i] = tau_p;
-      const bool p_given = given_ && given_->pressure.size();
-      const double p = p_given ? given_->pressure[i] : answer_.fields.pressure[i];
-      if (p_given) tau_p = 0;
-      tau_q_[i] = tau_p / (rho * rho) + 2 * std::abs(p) * tau_rho / (rho * rho * rho) +
-                  3 * u * std::abs(p) / (rho * rho);
+          terms.error(u, u * (inside + std::abs(by_H)), cells_) + misplaced + from_volumes + from_edge;
+      pressure_bounds(i);
     }
   }
 
-  /// Rounding of v_b = omega × (x_b − pivot) + v_pivot + v_surface, by wall particle, m/s.
-  void wall_velocity_error(const Walls& walls) {
-    wall_velocity_error_.resize(walls.size());
-    Eigen::Index b = 0;
-    for (std::size_t c = 0; c < walls.containers.size(); ++c) {
-      const Pose pose = pose_at(scene_.containers[c], scene_.time_at(state_.substep));
-      for (Eigen::Index k = 0; k < walls.containers[c].position.cols(); ++k, ++b)
-        wall_velocity_error_[b] =
-            pose.angular_velocity.norm() * (X_[b] + pose.pivot.cwiseAbs().maxCoeff()) +
-            pose.linear_velocity.norm() + pose.surface_velocity.norm();
-    }
+  /// Pressure follows from the backend's own density unless density is given.
+  void pressure_bounds(Eigen::Index i) {
+    const FluidProperties& fluid = scene_.fluid;
+    const double gamma = fluid.eos_exponent, B = scene_.eos_stiffness(), c0 = fluid.sound_speed;
+    const double rho0 = fluid.rest_density;
+    const bool rho_given = given_ && given_->density.size();
+    const double rho = rho_given ? given_->density[i] : answer_.fields.density[i];
+    const double tau_rho = rho_given ? 0.0 : answer_.tolerance.density[i];
+    const double compression = rho / rho0, power = std::pow(compression, gamma);
+    const double unclamped = B * (power - 1);
+    const double off_rho0 = static_cast<double>(static_cast<float>(rho0)) == rho0 ? 0 : 1;
+    double tau_p = c0 * c0 * std::pow(compression, gamma - 1) * tau_rho +
+                   u * ((gamma * (2 + off_rho0) + 6) * B * power + 6 * std::abs(unclamped));
+    if (!fluid.allow_tension && unclamped + tau_p < 0) tau_p = 0;
+    answer_.tolerance.pressure[i] = tau_p;
+    const bool p_given = given_ && given_->pressure.size();
+    const double p = p_given ? given_->pressure[i] : answer_.fields.pressure[i];
+    if (p_given) tau_p = 0;
+    tau_q_[i] = tau_p / (rho * rho) + 2 * std::abs(p) * tau_rho / (rho * rho * rho) +
+                4 * u * std::abs(p) / (rho * rho);
+  }
+
+  /// Error of x_i − x_b, by component, m.
+  Vec3 wall_error(Eigen::Index b, const Vec3& x_i, const Vec3& x_b, const Vec3& x_ib) const {
+    return pose_.position.col(b) + pair_error(x_i, x_b, x_ib, H_, u);
   }
 
   void accelerations() {
@@ -184,26 +175,29 @@ class Bounds {
     for (auto* sum : {&C.pressure_acceleration, &C.viscous_acceleration,
                       &C.wall_pressure_acceleration, &C.wall_viscous_acceleration})
       sum->setZero(3, n);
+    ForceBounds pressure, viscous, wall_pressure, wall_viscous;
     for (Eigen::Index i = 0; i < n; ++i) {
-      const auto& fluid = near_.fluid[static_cast<std::size_t>(i)];
-      const auto& wall = near_.wall[static_cast<std::size_t>(i)];
-      ForceBounds pressure, viscous, wall_pressure, wall_viscous;
-      fluid_bounds(i, fluid, pressure, viscous);
-      wall_bounds(i, wall, wall_pressure, wall_viscous);
+      for (ForceBounds* part : {&pressure, &viscous, &wall_pressure, &wall_viscous}) part->clear();
+      fluid_bounds(i, near_.fluid[static_cast<std::size_t>(i)], pressure, viscous);
+      wall_bounds(i, near_.wall[static_cast<std::size_t>(i)], wall_pressure, wall_viscous);
+      const double in_common = common_.G + 5;  // 5: G and L go with H⁻⁵
+      pressure.close(in_common + of_mass);
+      viscous.close(in_common + of_mass);
+      wall_pressure.close(in_common);
+      wall_viscous.close(in_common);
       C.pressure_acceleration.col(i) = pressure.condition;
       C.viscous_acceleration.col(i) = viscous.condition;
       C.wall_pressure_acceleration.col(i) = wall_pressure.condition;
       C.wall_viscous_acceleration.col(i) = wall_viscous.condition;
-      const double by_fluid = growth(fluid.size() + 1, 8), by_wall = growth(wall.size() + 1, 8);
-      T.pressure_acceleration.col(i) = pressure.tolerance(by_fluid, tau_q_[i]);
-      T.viscous_acceleration.col(i) = viscous.tolerance(by_fluid, 0);
-      T.wall_pressure_acceleration.col(i) = wall_pressure.tolerance(by_wall, tau_q_[i]);
-      T.wall_viscous_acceleration.col(i) = wall_viscous.tolerance(by_wall, 0);
-      ForceBounds all = pressure;
-      ((all += viscous) += wall_pressure) += wall_viscous;
-      T.acceleration.col(i) =
-          all.tolerance(growth(fluid.size() + wall.size() + 1, 8), tau_q_[i]) +
-          3 * u * (scene_.gravity.cwiseAbs() + answer_.fields.acceleration.col(i).cwiseAbs());
+      T.pressure_acceleration.col(i) = pressure.tolerance(tau_q_[i], cells_);
+      T.viscous_acceleration.col(i) = viscous.tolerance(0, cells_);
+      T.wall_pressure_acceleration.col(i) = wall_pressure.tolerance(tau_q_[i], cells_);
+      T.wall_viscous_acceleration.col(i) = wall_viscous.tolerance(0, cells_);
+      // Gravity is a term like any other: a register may start from it.
+      ((pressure += viscous) += wall_pressure) += wall_viscous;
+      pressure.add(scene_.gravity);
+      pressure.inside += scene_.gravity.cwiseAbs();
+      T.acceleration.col(i) = pressure.tolerance(tau_q_[i], cells_);
     }
   }
 
@@ -224,21 +218,28 @@ class Bounds {
   void fluid_bounds(Eigen::Index i, const std::vector<std::int32_t>& ids, ForceBounds& pressure,
                     ForceBounds& viscous) const {
     const double m = scene_.particle_mass(), mu = scene_.fluid.viscosity;
+    const double own = of_pressure_term, own_viscous = of_viscous_term;
     const Vec3 x_i = state_.position.col(i), v_i = state_.velocity.col(i);
     for (const auto j : ids) {
       const Vec3 x_j = state_.position.col(j), x_ij = separation_(x_i, x_j);
       const double r = x_ij.norm(), G = kernel_.G(r), dG = kernel_.slope_G(r);
       const Vec3 x = x_ij.cwiseAbs();
-      const double A = m * std::abs(q_of(i) + q_of(j)), image = image_magnitude(x_i, x_j, x_ij);
-      pressure.condition += A * (G + r * dG) * x;
-      pressure.pose += A * image * (Vec3::Constant(G) + std::sqrt(3.0) * dG * x);
+      const double A = m * (std::abs(q_of(i)) + std::abs(q_of(j)));
+      const Vec3 e = pair_error(x_i, x_j, x_ij, H_, u);
+      const double e_r = along(x_ij, r, e);
+      pressure.add(m * (q_of(i) + q_of(j)) * G * x_ij);
+      pressure.condition += m * std::abs(q_of(i) + q_of(j)) * (G + r * dG) * x;
+      pressure.inside += A * (own * G + of_distance_and_H * r * dG) * x;
+      pressure.pose += A * (G * e + dG * e_r * x);
       pressure.squares += (m * tau_q_[j] * G * x).cwiseAbs2();
       pressure.gradient += m * G * x_ij;
-      const Vec3 dv = (state_.velocity.col(j) - v_i).cwiseAbs();
+      const Vec3 v_ji = state_.velocity.col(j) - v_i, dv = v_ji.cwiseAbs();
       const double D = mu / density_of(i) * m / density_of(j);
       const double L = kernel_.L(r), dL = kernel_.slope_L(r);
+      viscous.add(D * L * v_ji);
       viscous.condition += D * (L + r * dL) * dv;
-      viscous.pose += D * dL * std::sqrt(3.0) * image * dv;
+      viscous.inside += D * (own_viscous * L + of_distance_and_H * r * dL) * dv;
+      viscous.pose += D * dL * e_r * dv;
       viscous.inputs += D * L * (relative_density_error(i) + relative_density_error(j)) * dv;
     }
     for (const Edge& e : edge_fluid_[static_cast<std::size_t>(i)]) {
@@ -253,23 +254,30 @@ class Bounds {
   void wall_bounds(Eigen::Index i, const std::vector<std::int32_t>& ids, ForceBounds& pressure,
                    ForceBounds& viscous) const {
     const double rho0 = scene_.fluid.rest_density, mu_w = scene_.fluid.wall_viscosity;
+    const double own = of_pressure_term + of_wall_factors;
+    const double own_viscous = of_viscous_term + of_wall_factors;
     const auto& V = answer_.fields.boundary_volume;
     const Vec3 x_i = state_.position.col(i), v_i = state_.velocity.col(i);
     for (const auto b : ids) {
       const Vec3 x_b = posed_.position.col(b), x_ib = separation_(x_i, x_b);
       const double r = x_ib.norm(), G = kernel_.G(r), dG = kernel_.slope_G(r);
       const Vec3 x = x_ib.cwiseAbs();
-      const double X = std::max(X_[b], image_magnitude(x_i, x_b, x_ib));
+      const Vec3 e = wall_error(b, x_i, x_b, x_ib);
+      const double e_r = along(x_ib, r, e);
       const double tau_V = answer_.tolerance.boundary_volume[b];
       const double A = rho0 * V[b] * std::abs(q_of(i));
+      pressure.add(rho0 * V[b] * q_of(i) * G * x_ib);
       pressure.condition += A * (G + r * dG) * x;
-      pressure.pose += A * X * (Vec3::Constant(G) + std::sqrt(3.0) * dG * x);
+      pressure.inside += A * (own * G + of_distance_and_H * r * dG) * x;
+      pressure.pose += A * (G * e + dG * e_r * x);
       pressure.inputs += A / V[b] * tau_V * G * x;
       pressure.gradient += rho0 * V[b] * G * x_ib;
-      const Vec3 dv = (posed_.velocity.col(b) - v_i).cwiseAbs();
+      const Vec3 v_bi = posed_.velocity.col(b) - v_i, dv = v_bi.cwiseAbs();
       const double D = mu_w / density_of(i) * V[b], L = kernel_.L(r), dL = kernel_.slope_L(r);
+      viscous.add(D * L * v_bi);
       viscous.condition += D * (L + r * dL) * dv;
-      viscous.pose += D * (dL * std::sqrt(3.0) * X * dv + Vec3::Constant(L * wall_velocity_error_[b]));
+      viscous.inside += D * (own_viscous * L + of_distance_and_H * r * dL) * dv;
+      viscous.pose += D * (dL * e_r * dv + L * pose_.velocity.col(b));
       viscous.inputs += D * L * (relative_density_error(i) + tau_V / V[b]) * dv;
     }
     for (const Edge& e : edge_wall_[static_cast<std::size_t>(i)]) {
@@ -291,14 +299,19 @@ class Bounds {
            std::all_of(x.data(), x.data() + x.size(), whole);
   }
 
-  /// Pairs within 8 u X of H, X the largest magnitude the distance passes through; those beyond H have no
-  /// term in the oracle's sums, but may have one in fp32.
+  /// Pairs whose distance fp32 may find on the other side of H: within 8 u H and what their places are
+  /// off. Those beyond H have no term in the oracle's sums, but may have one in fp32; those inside may have
+  /// none, or one that their own, near zero of an order above one, says nothing about.
   void ambiguous_pairs() {
     const double H = scene_.support_radius();
-    const double widest = std::max({H, X_.size() ? X_.maxCoeff() : 0.0,
-                                    (scene_.domain.max - scene_.domain.min).maxCoeff()});
+    const Domain& domain = scene_.domain;
+    double widest = 12 * u * H;
+    if (pose_.position.size()) widest += pose_.position.colwise().norm().maxCoeff();
+    if (domain.periodic[0] || domain.periodic[1] || domain.periodic[2])
+      widest += 3 * u * (3 * (domain.max - domain.min).maxCoeff() +
+                         domain.min.cwiseAbs().cwiseMax(domain.max.cwiseAbs()).maxCoeff());
     Scene wider = scene_;
-    wider.support_ratio = (H + 8 * u * widest) / scene_.particle_spacing;
+    wider.support_ratio = (H + widest) / scene_.particle_spacing;
     Neighbors near;
     find_neighbors(wider, state_.position, posed_.position, NeighborSearch::cells, near);
     const auto n = static_cast<std::size_t>(state_.size());
@@ -313,21 +326,21 @@ class Bounds {
       const Vec3 x_i = state_.position.col(static_cast<Eigen::Index>(i));
       for (const auto j : near.fluid[i]) {
         const Vec3 x_j = state_.position.col(j), x_ij = separation_(x_i, x_j);
-        const double margin = 8 * u * std::max(H, image_magnitude(x_i, x_j, x_ij));
+        const double margin = 8 * u * H + pair_error(x_i, x_j, x_ij, H_, u).norm();
         const double r = x_ij.norm();
         if (!exact && std::abs(r - H) <= margin) {
           answer_.fluid_ambiguous[i] = true;
-          if (r >= H) edge_fluid_[i].push_back({j, H - margin});
+          edge_fluid_[i].push_back({j, std::min(r, H) - margin});
         }
         expected_fluid += 6 * margin / H;
       }
       for (const auto b : near.wall[i]) {
         const Vec3 x_b = posed_.position.col(b), x_ib = separation_(x_i, x_b);
-        const double margin = 8 * u * std::max({H, X_[b], image_magnitude(x_i, x_b, x_ib)});
+        const double margin = 8 * u * H + wall_error(b, x_i, x_b, x_ib).norm();
         const double r = x_ib.norm();
         if (std::abs(r - H) <= margin) {
           answer_.wall_ambiguous[i] = true;
-          if (r >= H) edge_wall_[i].push_back({b, H - margin});
+          edge_wall_[i].push_back({b, std::min(r, H) - margin});
         }
         expected_wall += 6 * margin / H;
       }
@@ -339,12 +352,16 @@ class Bounds {
   const Scene& scene_;
   const ParticleState& state_;
   const StageInputs* given_;
+  double H_;
   Kernel<double> kernel_;
   Separation separation_;
   PosedWalls posed_;
-  Eigen::VectorXd X_, tau_q_, wall_velocity_error_;
+  PoseErrors pose_;
+  CommonRoundings common_;
+  Eigen::VectorXd tau_q_;
+  CellCounter cells_;
   Neighbors near_;
-  /// A pair at H or just beyond, and the least distance that fp32 may find.
+  /// A pair near H, and the least distance that fp32 may find.
   struct Edge {
     std::int32_t id;
     double r;

@@ -67,6 +67,42 @@ TEST_F(NamedFields, AreBoundByTheirConditionSums) {
   expect_bound((10 + 2) * 0x1p-11 * 10 + 0.5);
 }
 
+/// Two sums in double differ by the roundings of both.
+TEST_F(NamedFields, OfAPortInDoubleAreBoundByBothSidesRounding) {
+  reference([&](Hdf5Writer& out) {
+    out.vector("/fields/x", x_, "");
+    out.vector("/condition/x", Eigen::VectorXd::Constant(4, 10.0), "");
+    out.attribute("/condition/x", "terms", 100);
+    out.attribute("/condition/x", "precision", 0x1p-53);
+  });
+  const double bound = (10 + 8) * (0x1p-53 + 0x1p-53) * 10;
+  EXPECT_EQ(status_off_by(0.9 * bound), 0);
+  EXPECT_EQ(status_off_by(1.1 * bound), 1);
+}
+
+TEST_F(NamedFields, MayBeSoLargeThatTheirSquaresOverflow) {
+  x_ *= 1e300;
+  reference([&](Hdf5Writer& out) {
+    out.vector("/fields/x", x_, "");
+    out.attribute("/fields/x", "relative", 1e-3);
+  });
+  EXPECT_EQ(status_off_by(0), 0);
+  const double bound = 1e-3 * std::sqrt((1.0 + 4 + 9 + 16) / 4) * 1e300;
+  EXPECT_EQ(status_off_by(0.999 * bound), 0);
+  EXPECT_EQ(status_off_by(1.001 * bound), 1);
+}
+
+TEST_F(NamedFields, WhoseToleranceOverflowsAreRefusedByName) {
+  reference([&](Hdf5Writer& out) {
+    out.vector("/fields/x", x_, "");
+    out.vector("/condition/x", Eigen::VectorXd::Constant(4, 1e300), "");
+    out.attribute("/condition/x", "terms", 100);
+    out.attribute("/condition/x", "c", 1e300);
+  });
+  port([&](Hdf5Writer& out) { out.vector("/fields/x", x_, ""); });
+  expect_refused(judged, "/fields/x");
+}
+
 TEST_F(NamedFields, AreBoundByStatedTolerances) {
   reference([&](Hdf5Writer& out) {
     out.vector("/fields/x", x_, "");

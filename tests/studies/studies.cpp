@@ -3,6 +3,8 @@
 ///
 /// scores    every backend on thousands of random cases: how errors are spread below their tolerances.
 ///           A correct backend above 1 is a false alarm; a median below 0.01 is a bound too loose.
+/// forms     every legal way to write the fields in fp32, on recordings and random cases: none may exceed a
+///           tolerance.
 /// ensemble  thousands of disturbed runs of the oracle against the bound of the recorded ensemble: how
 ///           often a correct run would be called wrong; and a viscosity wrong by 1 % against the same.
 /// coverage  which values of which keys of a scene the recordings and fuzzed problems have.
@@ -11,6 +13,7 @@
 #include "reference/sampling.hpp"
 #include "tests/random_scene.hpp"
 #include "tests/scene_coverage.hpp"
+#include "tests/studies/forms.hpp"
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -36,7 +39,7 @@ struct Settings {
   std::string executor = "host", out;
   std::uint32_t first = 1, cases = 10000;
   std::int64_t members = 1000;
-  int processes = 2, problems = 1000;
+  int processes = 2, problems = 1000, tries = 4;
 };
 
 /// Lines of task(k) for all k < count, from several processes; a backend that crashes takes none but its
@@ -163,6 +166,18 @@ int scores(const Settings& s) {
   return finish(s, text, alarms == 0);
 }
 
+int forms(const Settings& s) {
+  const auto count = static_cast<std::uint32_t>(s.fixtures.size()) + s.cases;
+  const FormsTable table = table_of_forms(spread(s.processes, count, [&](std::uint32_t k) {
+    return lines_of_forms(s.fixtures, k, s.first, s.tries);
+  }));
+  const std::string text = fmt::format(
+      "Legal forms of every operation in fp32 on {} recordings and random cases of seeds {} to {},\n"
+      "{} sets of forms each, drawn at random; score = |error| / tolerance; {} problems with particles.\n\n",
+      s.fixtures.size(), s.first, s.first + s.cases - 1, s.tries, table.problems);
+  return finish(s, text + table.text, table.above == 0);
+}
+
 int ensemble(const Settings& s) {
   std::string text = fmt::format(
       "Disturbed runs of the oracle against the bound 3 (mean + 6 deviations) of the recorded ensemble.\n"
@@ -234,22 +249,28 @@ int main(int argc, char** argv) {
   CLI::App app("Studies of the tolerances.");
   app.require_subcommand(1);
   CLI::App* scores = app.add_subcommand("scores", "random cases");
+  CLI::App* forms = app.add_subcommand("forms", "legal forms of fp32");
   CLI::App* ensemble = app.add_subcommand("ensemble", "disturbed runs");
   scores->add_option("--cases", s.cases)->capture_default_str();
   scores->add_option("--first", s.first, "first seed")->capture_default_str();
   scores->add_option("--backend", s.backends)->delimiter(',')->capture_default_str();
   scores->add_option("--executor", s.executor)->check(CLI::IsMember({"host", "cuda"}));
+  forms->add_option("FIXTURE", s.fixtures);
+  forms->add_option("--cases", s.cases)->capture_default_str();
+  forms->add_option("--first", s.first, "first seed")->capture_default_str();
+  forms->add_option("--tries", s.tries, "sets of forms per problem")->capture_default_str();
   ensemble->add_option("FIXTURE", s.fixtures)->required();
   ensemble->add_option("--members", s.members, "runs a fixture")->capture_default_str();
   CLI::App* coverage = app.add_subcommand("coverage", "keys of scenes in recordings and in fuzzing");
   coverage->add_option("--problems", s.problems, "fuzzed ones")->capture_default_str();
   coverage->add_option("--out", s.out, "write the table");
-  for (CLI::App* verb : {scores, ensemble}) {
+  for (CLI::App* verb : {scores, forms, ensemble}) {
     verb->add_option("--processes", s.processes)->capture_default_str();
     verb->add_option("--out", s.out, "write the table");
   }
   CLI11_PARSE(app, argc, argv);
   try {
+    if (*forms) return decant::forms(s);
     return *scores ? decant::scores(s) : *coverage ? decant::coverage(s) : decant::ensemble(s);
   } catch (const std::exception& error) {
     std::cerr << error.what() << '\n';

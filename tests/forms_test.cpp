@@ -1,0 +1,109 @@
+/// \file
+/// A few of the legal forms of tests/studies/forms.cpp, on every build: none exceeds a tolerance, and the
+/// evaluator they are written in is not so loose that a fault would pass.
+#include "tests/forms.hpp"
+
+#include "reference/sampling.hpp"
+
+#include <gtest/gtest.h>
+
+namespace decant {
+namespace {
+
+using test::Forms;
+
+struct Problem {
+  Fixture fixture;
+  Walls walls;
+  WallAnswer volumes;
+  OracleAnswer own, given;
+  StageInputs staged;
+
+  explicit Problem(Fixture f)
+      : fixture(std::move(f)),
+        walls(sample_walls(fixture.scene)),
+        volumes(wall_answer(fixture.scene, walls)),
+        own(answer(fixture.scene, walls, volumes, fixture.state)) {
+    staged.density = own.fields.density.cast<float>().cast<double>();
+    staged.pressure = own.fields.pressure.cast<float>().cast<double>();
+    given = answer(fixture.scene, walls, volumes, fixture.state, &staged);
+  }
+  void expect_within(const Forms& forms) const {
+    std::string text = fixture.name;
+    for (const auto& [name, value] : test::choices(forms)) text += ", " + name + ": " + value;
+    const auto expect = [&](const OracleAnswer& oracle, const StageInputs* inputs) {
+      const Fields got =
+          test::evaluate_by(forms, fixture.scene, walls, fixture.state, inputs);
+      for (const auto& [field, score] : test::scores(got, oracle))
+        EXPECT_LE(score, 1) << field << (inputs ? ", staged; " : "; ") << text;
+    };
+    expect(own, nullptr);
+    expect(given, &staged);
+  }
+};
+
+TEST(LegalForms, StayWithinEveryTolerance) {
+  for (std::uint32_t seed = 1; seed <= 24; ++seed) {
+    const Problem problem(test::random_form_case(seed));
+    std::mt19937 random(seed);
+    for (int k = 0; k < 3; ++k) problem.expect_within(test::random_forms(random));
+  }
+}
+
+TEST(LegalForms, StayWithinEveryToleranceOnAPourAtRest) {
+  const Problem problem(read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-rest.h5"));
+  Forms forms;
+  forms.accumulate = Forms::Register::gravity_first;
+  problem.expect_within(forms);
+  forms.order = Forms::Order::smallest_first;
+  forms.constants = Forms::Constant::formed;
+  problem.expect_within(forms);
+}
+
+/// A block on an exact lattice, many neighbors and a slow shear: hundreds of equal terms, far smaller than g.
+TEST(LegalForms, MayStartASumFromGravityWhereTermsAreManyAndEqual) {
+  for (const double ratio : {3.0, 5.0}) {
+    Fixture f = test::random_form_case(1);
+    f.scene.containers.clear();
+    f.scene.support_ratio = ratio;
+    f.scene.gravity = Vec3(0, 0, -9.81);
+    f.scene.fluid.viscosity = 0.05;
+    f.scene.domain = {Vec3::Constant(-1), Vec3::Constant(1), {}};
+    const double dx = f.scene.particle_spacing = 0.004;
+    f.state.position.resize(3, 343);
+    f.state.velocity.setZero(3, 343);
+    for (Eigen::Index i = 0; i < 343; ++i) {
+      f.state.position.col(i) = dx * Vec3(static_cast<double>(i % 7), static_cast<double>(i / 7 % 7),
+                                          static_cast<double>(i / 49));
+      f.state.velocity(2, i) = 1e-4 * static_cast<double>(i % 7);
+    }
+    f.state.quantise();
+    f.state.substep = 0;
+    const Problem problem(std::move(f));
+    Forms forms;
+    forms.accumulate = Forms::Register::gravity_first;
+    for (const auto order : {Forms::Order::by_id, Forms::Order::largest_first, Forms::Order::random}) {
+      forms.order = order;
+      problem.expect_within(forms);
+    }
+  }
+}
+
+TEST(LegalForms, AreNotWhatFaultsHideBehind) {
+  const Problem problem(read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-filling.h5"));
+  const auto score = [&](const char* field, void (*wrong)(Fields&)) {
+    Fields got = test::evaluate_by({}, problem.fixture.scene, problem.walls, problem.fixture.state,
+                                   &problem.staged);
+    wrong(got);
+    return test::scores(got, problem.given).at(field);
+  };
+  EXPECT_GT(score("density", [](Fields& f) { f.density *= 1 + 2e-6; }), 1);
+  EXPECT_GT(score("pressure", [](Fields& f) { f.pressure *= 1 + 1e-5; }), 1);
+  EXPECT_GT(score("viscous_acceleration", [](Fields& f) { f.viscous_acceleration *= 1 + 1e-5; }), 1);
+  EXPECT_GT(score("wall_viscous_acceleration",
+                  [](Fields& f) { f.wall_viscous_acceleration *= 1 + 3e-5; }),
+            1);
+}
+
+}  // namespace
+}  // namespace decant
