@@ -31,7 +31,7 @@ struct HostFields {
   std::vector<std::int64_t> fluid_count, fluid_id_sum, wall_count, wall_id_sum;
 };
 
-/// Oracle's inputs for later stages; empty: not given.
+/// Oracle's inputs for later stages; empty: not given. Pressure comes with density.
 struct GivenInputs {
   std::vector<float> boundary_volume, density, pressure;
 };

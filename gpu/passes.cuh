@@ -100,14 +100,19 @@ struct DensityPass {
   }
 };
 
-/// What neighbors read, from density and pressure given from outside, by id.
+/// What neighbors read, from density and pressure given from outside, by id; and the pressure that follows
+/// from that density, which stands in for one that is not given.
 struct GivenPass {
+  Constants c;
   Arrays a;
-  const float *density, *pressure;
+  const float *density, *pressure;  // pressure null: not given
+  float* own_pressure;
 
   DECANT_DEVICE void operator()(int i) const {
     const int id = a.id[i];
-    a.point[i].w = pressure[id] / (density[id] * density[id]);
+    const float own = pressure_at(c, density[id]);
+    own_pressure[id] = own;
+    a.point[i].w = (pressure ? pressure[id] : own) / (density[id] * density[id]);
     a.motion[i].w = 1.0f / density[id];
   }
 };

@@ -70,7 +70,7 @@ class Pipeline : public DeviceSolver {
         constexpr bool p = decltype(periodic)::value;
         const Arrays a = arrays();
         search_.template density<p, true>(queue_, a, geometry(), fields, Laps());
-        if (!given.density.empty()) use_given(a, given);
+        if (!given.density.empty()) use_given(a, given, fields.pressure);
         search_.template force<p, true>(queue_, a, fields, Laps());
       });
       queue_.wait();
@@ -374,11 +374,13 @@ class Pipeline : public DeviceSolver {
     each_saved([&](void* to, void* from, std::size_t bytes) { queue_.copy(to, from, bytes); });
   }
 
-  void use_given(const Arrays& a, const GivenInputs& given) {
+  void use_given(const Arrays& a, const GivenInputs& given, float* own_pressure) {
     Buffer<float> density(static_cast<std::size_t>(n_)), pressure(static_cast<std::size_t>(n_));
     density.upload(given.density);
-    pressure.upload(given.pressure);
-    queue_.for_each(n_, GivenPass{a, density.get(), pressure.get()});
+    const bool pressure_too = !given.pressure.empty();
+    if (pressure_too) pressure.upload(given.pressure);
+    queue_.for_each(n_, GivenPass{c_, a, density.get(), pressure_too ? pressure.get() : nullptr,
+                                  own_pressure});
     queue_.wait();  // the two buffers end here
   }
 

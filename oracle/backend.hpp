@@ -66,7 +66,7 @@ class Backend {
   /// Takes scene, wall particles and state; may allocate. May be called again.
   virtual void load(const Scene&, const Walls&, const ParticleState&) = 0;
   /// Fields at the state, after `advance` from what its next substep would use; no later run changes by it. `out`
-  /// arrives as Fields::unwritten. Where `given` holds a stage's inputs, later stages use those.
+  /// arrives as Fields::unwritten. Later stages use `given`; out.pressure is always that of the density in use.
   [[nodiscard]] virtual Status evaluate(Fields& out, const StageInputs* given = nullptr) = 0;
   /// `substeps` × dt onward.
   [[nodiscard]] virtual Status advance(int substeps) = 0;

@@ -65,8 +65,8 @@ Judgement prepare(const Fixture& fixture, const CheckSelection& checks = all_che
 /// Loads the fixture into the backend and compares; a backend that throws or reports trouble gives
 /// rows with verdict fail and the reason. Rows of the check `fields` carry the stage's name:
 ///   neighbors, boundary_volume, density, pressure   as the backend computes them
-///   acceleration    from the oracle's density and pressure
-///   evaluation      from the backend's own
+///   equation_of_state, acceleration   from the oracle's density, and pressure
+///   evaluation                        from the backend's own
 /// \param oracle  prepared for these checks at least
 std::vector<CheckRow> judge(Backend& backend, const Fixture& fixture, const Judgement& oracle,
                             const CheckSelection& checks = all_checks());

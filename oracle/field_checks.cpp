@@ -117,6 +117,10 @@ void judge_stages(const Fields& got, const Answered& answered, const Judgement& 
 
 void judge_staged(const Fields& got, const Answered& answered, const Judgement& oracle,
                   Sheet& sheet) {
+  judge_field("equation_of_state", "pressure", "Pa", answered,
+              {got.pressure, oracle.given.fields.pressure, oracle.given.tolerance.pressure,
+               oracle.given_float.pressure, 1, nullptr, 0},
+              sheet);
   judge_accelerations("acceleration", got, answered, oracle.given, oracle.given_float, sheet);
 }
 

@@ -61,7 +61,7 @@ inline constexpr const char* not_given = "not given";
 void judge_stages(const Fields& got, const Answered& answered, const Judgement& oracle,
                   Sheet& sheet);
 
-/// Row `acceleration`: accelerations from the oracle's own density and pressure.
+/// Rows `equation_of_state`, `acceleration`: from the oracle's own density and pressure.
 void judge_staged(const Fields& got, const Answered& answered, const Judgement& oracle,
                   Sheet& sheet);
 

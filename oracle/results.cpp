@@ -43,6 +43,7 @@ class ResultsReader {
     for (const auto& field : acceleration_fields) staged_names.push_back(field.name);
     own_names.insert(own_names.end(), staged_names.begin(), staged_names.end());
     require_known(own_group, own_names);
+    staged_names.push_back("pressure");
     require_known(staged_group, staged_names);
     require_known(after_group, {"position", "velocity"});
     Fields& own = results_.own_fields;
@@ -66,6 +67,9 @@ class ResultsReader {
       take(own_group, field.name, "m/s^2", results_.own, into(own));
       take(staged_group, field.name, "m/s^2", results_.staged, into(results_.staged_fields));
     }
+    take(staged_group, "pressure", "Pa", results_.staged, [&](const std::string& path) {
+      results_.staged_fields.pressure = ordered(in_.vector(path, rows_));
+    });
     ParticleState& after = results_.after_state;
     take(after_group, "position", "m", results_.after, [&](const std::string& path) {
       after.position = ordered(in_.matrix3(path, rows_));

@@ -74,8 +74,8 @@ struct Fields {
   }
 };
 
-/// Inputs of later stages as the oracle has them, rounded to fp32; an empty member is not
-/// given. Density and pressure come together. Lets a backend's accelerations be judged apart from its density.
+/// Inputs of later stages as the oracle has them, rounded to fp32; an empty member is not given. Pressure
+/// comes with density; density alone gives the pressure that follows. Lets stages be judged one by one.
 struct StageInputs {
   Eigen::VectorXd boundary_volume;  // M, m³
   Eigen::VectorXd density;          // N, kg/m³

@@ -77,6 +77,33 @@ TEST_P(BackendContract, AStateComesBackAsItWentIn) {
   expect_equal(state(), f.state);
 }
 
+/// Density alone: pressure is that of the given density, and accelerations follow from both.
+TEST_P(BackendContract, GivenDensityHasThePressureThatFollows) {
+  const Fixture f = test::random_fixture(2);
+  load(f);
+  const Eigen::Index n = f.state.size(), m = sample_walls(f.scene).size();
+  StageInputs given;
+  given.density = f.scene.fluid.rest_density *
+                  (1.05 + 0.1 * Eigen::ArrayXd::LinSpaced(n, -1, 1)).cast<float>().cast<double>();
+  given.density = given.density.cast<float>().cast<double>().eval();
+  Fields alone = Fields::unwritten(n, m), own = alone, both = alone;
+  ASSERT_TRUE(backend_->evaluate(own).ok());
+  ASSERT_TRUE(backend_->evaluate(alone, &given).ok());
+  const FluidProperties& fluid = f.scene.fluid;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double power = std::pow(given.density[i] / fluid.rest_density, fluid.eos_exponent),
+                 p = f.scene.eos_stiffness() * (power - 1);
+    EXPECT_NEAR(alone.pressure[i], fluid.allow_tension ? p : std::max(p, 0.0),
+                2e-6 * f.scene.eos_stiffness() * (power + 1));
+  }
+  EXPECT_TRUE(alone.density == own.density) << "the density summed is told all the same";
+  given.pressure = alone.pressure;
+  ASSERT_TRUE(backend_->evaluate(both, &given).ok());
+  EXPECT_TRUE(both.pressure == alone.pressure);
+  EXPECT_TRUE(both.acceleration == alone.acceleration);
+  EXPECT_FALSE(both.acceleration == own.acceleration);
+}
+
 TEST_P(BackendContract, EvaluatingLeavesTheStateAlone) {
   const Fixture f = test::random_fixture(2);
   load(f);

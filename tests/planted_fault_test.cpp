@@ -261,6 +261,32 @@ TEST(Containment, NamesTheSubstepWhereAsked) {
   }
 }
 
+/// The equation of state alone, and the walls' drag alone, are sharper than whatever follows from a density.
+TEST(SmallestFactors, AreCaughtOnAPour) {
+  const Fixture fixture = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-filling.h5");
+  const Judgement oracle = prepare(fixture, {"fields"});
+  const auto score = [&](const Edit& edit, const char* check, const char* field) {
+    EditedReference backend(edit);
+    for (const CheckRow& row : judge(backend, fixture, oracle, {"fields"}))
+      if (row.check == std::string(check) && row.field == field) return row.score;
+    return -1.0;
+  };
+  EXPECT_GT(score(scene_edit([](Scene& s) { s.fluid.sound_speed *= std::sqrt(1 + 1e-5); }),
+                  "equation_of_state", "pressure"),
+            1);
+  EXPECT_GT(score(scene_edit([](Scene& s) {
+                    // gamma alone: B = rho0 c0²/gamma stays
+                    s.fluid.eos_exponent *= 1 + 1e-5;
+                    s.fluid.sound_speed *= std::sqrt(1 + 1e-5);
+                  }),
+                  "equation_of_state", "pressure"),
+            1);
+  EXPECT_GT(score(scene_edit([](Scene& s) { s.fluid.wall_viscosity *= 1 + 3e-5; }), "acceleration",
+                  "wall_viscous_acceleration"),
+            1);
+  EXPECT_LT(score(Edit{}, "equation_of_state", "pressure"), 1e-3);
+}
+
 /// What one evaluation shows thousandfold must show in runs too, wherever viscosity matters.
 TEST(Trajectory, ShowsAPercentOfViscosityInItsEnergy) {
   for (const char* phase : {"settled", "splash"}) {

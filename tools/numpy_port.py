@@ -67,8 +67,11 @@ def solve(file, fault):
         i, j, xij, r = i[seen], j[seen], xij[seen], r[seen]
     a, b, xab, s = pairs(x, xw, H)
     rho = total(n, i, m * W(r)) + total(n, a, rho0 * V[b] * W(s)) + F(fault != "self") * m * W(F(0))
-    p = scene["eos_stiffness"] * ((rho / rho0) ** scene["eos_exponent"] - 1)
-    p = p if scene["allow_tension"] else np.maximum(p, F(0))
+
+    def pressure(rho):
+        p = scene["eos_stiffness"] * ((rho / rho0) ** scene["eos_exponent"] - 1)
+        return p if scene["allow_tension"] else np.maximum(p, F(0))
+    p = pressure(rho)
     fields = {"boundary_volume": V, "density": rho, "pressure": p}
     for name, near, ids in (("fluid", i, j), ("wall", a, b)):
         fields[f"{name}_neighbor_count"] = np.bincount(near, minlength=n)
@@ -85,7 +88,8 @@ def solve(file, fault):
         return {k + "acceleration": t for k, t in parts.items()}
     fields |= accelerations(rho, p)
     rho[n // 2] = np.nan if fault == "nan" else rho[n // 2]
-    return fields, accelerations(file["staged/density"][:], file["staged/pressure"][:])
+    staged = file["staged/density"][:]
+    return fields, accelerations(staged, file["staged/pressure"][:]) | {"pressure": pressure(staged)}
 
 
 if __name__ == "__main__":

@@ -48,8 +48,11 @@ fault("eos-exponent", "gamma is 6", "physics.cuh", "if (c.eos_exponent == 7) {",
       "brute")
 fault("tension", "negative pressures are kept", "physics.cuh",
       "return c.allow_tension ||", "return ON || c.allow_tension ||", "pressure")
-fault("stiffness", "B wrong by 1 %", "physics.cuh", "const float p = c.stiffness *",
-      "const float p = (ON ? 1.01f : 1.0f) * c.stiffness *", "pressure")
+fault("stiffness", "B wrong by 1 %", "physics.cuh", "c.stiffness", "1.01f * $", "pressure")
+fault("stiffness-slight", "B wrong by 1e-5", "physics.cuh", "c.stiffness", "1.00001f * $",
+      "equation_of_state", field="pressure", fixture="pour-4k-filling")
+fault("exponent-slight", "gamma wrong by 1e-5", "physics.cuh", "s2 * s2 * s2 * s",
+      "$ * (1.0f + 7e-5f * logf(s))", "equation_of_state", field="pressure", fixture="pour-4k-filling")
 fault("mass", "masses, of walls too, wrong by 5e-6", "queries.cuh",
       "float weight(int, float4 other) const { return other.w; }",
       "float weight(int, float4 other) const { return (ON ? 1.000005f : 1.0f) * other.w; }", "density")
@@ -67,8 +70,16 @@ fault("viscosity", "viscosity wrong by 1e-5", "passes.cuh", "c.viscosity * c.mas
       "1.00001f * $", "acceleration", "brute", "viscous_acceleration")
 fault("wall-viscosity", "wall viscosity wrong by 1e-3", "passes.cuh",
       "(wall ? c.wall_viscosity : fluid_viscosity)",
-      "(wall ? (ON ? 1.001f : 1.0f) * c.wall_viscosity : fluid_viscosity)", "acceleration",
+      "(wall ? 1.001f * c.wall_viscosity : fluid_viscosity)", "acceleration",
       field="wall_viscous_acceleration")
+fault("wall-viscosity-slight", "wall viscosity wrong by 3e-5", "passes.cuh",
+      "(wall ? c.wall_viscosity : fluid_viscosity)",
+      "(wall ? 1.00003f * c.wall_viscosity : fluid_viscosity)", "acceleration",
+      field="wall_viscous_acceleration", fixture="pour-4k-filling")
+fault("density-of-its-own", "pressure follows from the density summed where one is given", "passes.cuh",
+      "const float own = pressure_at(c, density[id]);",
+      "const float own = ON ? own_pressure[id] : pressure_at(c, density[id]);", "equation_of_state",
+      field="pressure")
 fault("one-sided-pressure", "pairs pushed by p_i alone: momentum is not kept", "passes.cuh",
       "(own[k].q + query.pressure_term(j, other))", "(own[k].q + own[k].q)", "conservation",
       field="pressure_momentum")
