@@ -13,17 +13,18 @@ const std::vector<CheckDescription>& check_descriptions() {
       {"fields",
        "Neighbor counts and id sums, boundary volumes, density, pressure and the four parts of the "
        "acceleration at the recorded state, particle by particle: first every stage from the "
-       "backend's own stage before (neighbors, boundary_volume, density, pressure, evaluation), and "
-       "the accelerations once more from the oracle's density and pressure (acceleration), so that "
-       "the first wrong stage is named.",
-       "A sum of n terms differs in fp32, in any order, by about (√n + c) u Σ|t|(1 + κ): n, Σ|t| and "
-       "the terms' own condition κ = r|f'|/f are summed by the oracle for every particle (Higham, "
-       "Accuracy and Stability, §3–4; √n: Higham & Mary 2019); c counts the roundings inside a term, "
-       "6 of a product, 8 of a vector with a quotient. Poses of moving walls, the equation of state "
-       "and what pressure hands on to accelerations have terms of their own (oracle/tolerance.hpp). "
+       "backend's own stage before (neighbors, boundary_volume, density, pressure, evaluation), then "
+       "pressure once more from the oracle's density (equation_of_state) and the accelerations from its "
+       "density and pressure (acceleration), so that the first wrong stage is named.",
+       "A sum, gravity one of its terms, differs in fp32 by what its additions lose in any order, terms "
+       "that round alike adding up (oracle/sum_bound.hpp), and by u Σ|t|(a + bκ): the terms' own "
+       "condition κ = r|f'|/f is summed by the oracle for every particle (Higham, Accuracy and "
+       "Stability, §3–4; Higham & Mary 2019); a and b count the roundings inside a term. Constants "
+       "formed in fp32, poses of moving walls, the equation of state and what pressure hands on to "
+       "accelerations have terms of their own. oracle/tolerances.md has every formula. "
        "Integers are exact, but for particles that own a pair too near H for fp32 to place; their "
        "number is bounded by four times what a fluid of this density has.",
-       "A factor of 1 + 1e-5 on G or on the stiffness B."},
+       "A factor of 1 + 1e-5 on G, or on B and gamma where nothing is compressed by more than a percent."},
       {"substep",
        "Positions and velocities one substep on: integration, moving walls, contact.",
        "tau_v = dt tau_a + 2u(|v| + dt|a|), tau_x = dt tau_v + u(2|x| + 4 dt|v|), and what contacts "
