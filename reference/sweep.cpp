@@ -34,7 +34,7 @@ std::vector<Ring> corners(const SolidBox& box) {
 /// The container turned by `angle` (rad), for good, and not translated.
 Pose pose_turned(const Container& container, double angle) {
   Container turned = container;
-  turned.tilt->keys = {{0.0, angle}};
+  turned.tilt->keys.assign(1, {0.0, angle});
   turned.tilt->rate = 0;
   turned.tilt->oscillation.reset();
   turned.translation.reset();
