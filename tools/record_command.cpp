@@ -7,6 +7,7 @@
 #include "reference/sampling.hpp"
 #include "reference/scene_file.hpp"
 #include "tools/backend_choice.hpp"
+#include "tools/build_provenance.hpp"
 #include "tools/checkpoint.hpp"
 #include "tools/commands.hpp"
 #include "tools/output_place.hpp"

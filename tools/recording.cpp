@@ -4,17 +4,8 @@
 
 #include "oracle/conform.hpp"
 #include "reference/sampling.hpp"
-#include "version.hpp"
 
 namespace decant {
-
-std::map<std::string, std::string> build_provenance() {
-  return {{"version", version},
-          {"git_revision", git_revision},
-          {"compiler", compiler},
-          {"flags", flags},
-          {"build_type", build_type}};
-}
 
 std::string record_answer(Fixture& fixture, std::int64_t ensemble_substeps,
                           std::int64_t ensemble_members) {

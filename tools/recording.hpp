@@ -1,17 +1,13 @@
 /// \file
-/// What every program that writes a fixture does: the oracle's answer, its ensemble, who made it.
+/// What every program that writes a fixture does: the oracle's answer, its ensemble.
 #pragma once
 
 #include "oracle/fixture.hpp"
 
 #include <cstdint>
-#include <map>
 #include <string>
 
 namespace decant {
-
-/// version, git_revision, compiler, flags, build_type of this program.
-std::map<std::string, std::string> build_provenance();
 
 /// Rounds the fixture's state to fp32, evaluates fields and condition sums there, and runs its
 /// ensemble. Returns why no backend can pass on that state, for people to read; empty for a sound

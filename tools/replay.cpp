@@ -3,6 +3,7 @@
 #include "tools/replay.hpp"
 
 #include "oracle/surroundings.hpp"
+#include "tools/build_provenance.hpp"
 #include "tools/recording.hpp"
 
 #include <fmt/format.h>

@@ -3,6 +3,7 @@
 #include "tools/fuzz/campaign.hpp"
 
 #include "reference/scene_file.hpp"
+#include "tools/build_provenance.hpp"
 #include "tools/recording.hpp"
 
 #include <fmt/format.h>

@@ -1,8 +1,8 @@
 /// \file
 /// Campaigns as a table and as HDF5.
 #include "oracle/hdf5_io.hpp"
+#include "tools/build_provenance.hpp"
 #include "tools/fuzz/campaign.hpp"
-#include "tools/recording.hpp"
 
 #include <fmt/format.h>
 
