@@ -140,7 +140,8 @@ fault("wall-motion-not-summed", "the walls' displacement since the build is that
       "a.mailbox->wall_way = (ON ? 0.0f : a.mailbox->wall_way) + step;",
       shows="list: a tilting container whose wall sweeps towards fluid at rest")
 fault("given-inputs-by-index", "given densities and pressures are read by index, not by id", "passes.cuh",
-      "pressure[id] / (density[id] * density[id])", "pressure[i] / (density[i] * density[i])",
+      "(pressure ? pressure[id] : own) / (density[id] * density[id])",
+      "(pressure ? pressure[i] : own) / (density[i] * density[i])",
       shows="hash and list, evaluate with given inputs once particles are not in the order of their ids")
 fault("viscosity-by-own-density", "fluid viscosity divides by the particle's own density twice", "passes.cuh",
       "moves.w * (wall ? c.wall_viscosity : fluid_viscosity)",
