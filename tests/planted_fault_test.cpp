@@ -153,7 +153,7 @@ const Fault catalogue[] = {
      scene_edit([](Scene& s) { s.contact.friction *= 1.001; })},
     {"RestitutionOffByAThousandth", "contact", "velocity",
      scene_edit([](Scene& s) { s.contact.restitution *= 1.001; })},
-    {"NeighborLostInARun", "advanced", "fluid_neighbor_count after 17", [] {
+    {"NeighborLostInARun", "advanced", "fluid_neighbor_count after 11", [] {
        Edit edit;
        edit.found = [searches = 0](const Scene&, Neighbors& n, Eigen::VectorXd&) mutable {
          if (++searches > 5) longest(n.fluid).pop_back();
