@@ -8,11 +8,14 @@
 #include "oracle/reference_backend.hpp"
 #include "reference/initial_state.hpp"
 #include "reference/sampling.hpp"
+#include "reference/scene_checks.hpp"
+#include "reference/scene_file.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <utility>
 
 namespace decant {
@@ -148,6 +151,40 @@ TEST_P(KeptList, MissesNoPairWhereTheWallsAreFasterThanTheFluid) {
     EXPECT_GT(list->neighbor_stats().verified.wall_pairs, 5'000) << name;
     EXPECT_EQ(list->neighbor_stats().verified.wall_missed, 0) << name;
   }
+}
+
+TEST_P(KeptList, MissesNoPairOfAPistonThatComesUponFluidAtRest) {
+  // From two supports away, at up to a fifth of the speed of sound, and half through.
+  Scene scene = load_scene(DECANT_SOURCE_DIR "/fixtures/scenes/motion-piston.json");
+  scene.gravity.setZero();
+  scene.fills[0].around.clear();
+  scene.fills[0].box = SolidBox{Vec3(0.1, 0, 0), Vec3(0.2, 0.06, 0.06)};
+  Translation& stroke = *scene.containers[1].translation;
+  stroke.keys = {{0, Vec3::Zero()}, {0.06, Vec3(0.1, 0, 0)}};
+  stroke.oscillation.reset();
+  scene.schedule.substeps_per_frame = substeps_for(scene);
+  check_scene(scene, scene.name);
+  const Walls walls = sample_walls(scene);
+  for (const char* name : {"list:verify=on", "list:verify=on:skin=0.2", "list:verify=on:trigger=local"}) {
+    const auto list = make(name);
+    list->load(scene, walls, initial_state(scene));
+    for (int k = 0; k < 20; ++k) ASSERT_EQ(list->advance(8).bits & Status::missed_pair, 0u) << name;
+    EXPECT_GT(list->neighbor_stats().verified.wall_pairs, 5'000) << name;
+    EXPECT_EQ(list->neighbor_stats().verified.wall_missed, 0) << name;
+    // Lists are kept for some substeps, or there would be nothing to see.
+    EXPECT_LT(list->neighbor_stats().rebuilds, 140) << name;
+  }
+}
+
+TEST_P(KeptList, IsBuiltAnewBecauseThePistonMovesWhateverTheFluidDoes) {
+  // A wall that goes 0.02 H a substep, far from fluid that rests: a skin of 0.2 H lasts five substeps.
+  Fixture f = flight(Vec3::Zero());
+  const double H = f.scene.support_radius(), v = 0.02 * H / f.scene.time_step();
+  f.scene.containers.push_back({"piston", tank_shape(Vec3::Constant(H), 2 * H, {}),
+                                Vec3::Constant(-0.5), 2 * H, {}});
+  f.scene.containers[0].translation.emplace().velocity = Vec3(v, 0, 0);
+  const auto list = make("list:skin=0.2");
+  EXPECT_GE(rebuilds_of(*list, f, 90), 90 / 6);
 }
 
 /// What is loaded anew knows nothing of its distance from the walls and looks for them.

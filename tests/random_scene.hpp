@@ -76,6 +76,14 @@ inline Fixture random_fixture(std::uint32_t seed) {
   f.state.quantise();
   if (!scene.containers.empty() && chance(0.3))
     scene.containers[0].surface_velocity = Vec3(real(-1, 1), real(-1, 1), real(-1, 1));
+  // About where the tank stands, at up to a few m/s.
+  if (!scene.containers.empty() && chance(0.3)) {
+    Vec3 amplitude = dx * Vec3(real(-0.5, 0.5), real(-0.5, 0.5), real(-0.5, 0.5));
+    for (int a = 0; a < 3; ++a)
+      if (scene.domain.periodic[static_cast<std::size_t>(a)]) amplitude[a] = 0;
+    scene.containers[0].translation.emplace().oscillation = {amplitude, real(0.1, 0.5) / dx,
+                                                            real(0, 6)};
+  }
   return f;
 }
 

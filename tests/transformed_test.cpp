@@ -3,7 +3,9 @@
 #include "gpu/backends.hpp"
 #include "oracle/conform.hpp"
 #include "reference/error.hpp"
+#include "reference/pose.hpp"
 #include "reference/sampling.hpp"
+#include "reference/scene_file.hpp"
 
 #include <gtest/gtest.h>
 
@@ -26,6 +28,27 @@ TEST(Transformed, ProblemsHaveTheAnswersOfTheProblem) {
     EXPECT_NEAR(its.fields.acceleration.norm() / before, 1, 10 * allowed) << p.name;
   }
   EXPECT_EQ(problems[2].scene.containers[0].tilt->axis.x(), -f.scene.containers[0].tilt->axis.y());
+}
+
+TEST(Transformed, MoveAndTurnWhateverContainersDo) {
+  Fixture f;
+  f.scene = load_scene(DECANT_SOURCE_DIR "/fixtures/scenes/motion-sway.json");
+  f.scene.containers[0].translation->keys.push_back({0.4, Vec3(0.01, 0.02, 0.03)});
+  f.scene.containers[0].translation->velocity = {0.1, -0.2, 0.3};
+  f.state.position = f.state.velocity = Eigen::Matrix3Xd::Zero(3, 1);
+  const auto turned = [](const Vec3& x) { return Vec3(-x.y(), x.x(), x.z()); };
+  const auto problems = transformed_problems(f.scene, f.state);
+  const Vec3 local(0.01, 0.05, 0.02), way = Vec3::Constant(0.5);
+  for (const double t : {0.0, 0.3, 0.7}) {
+    const Pose pose = pose_at(f.scene.containers[0], t);
+    const Vec3 x = pose.to_world(local), v = pose.velocity_at(x);
+    const Pose moved = pose_at(problems[1].scene.containers[0], t),
+               round = pose_at(problems[2].scene.containers[0], t);
+    EXPECT_LT((moved.to_world(local) - x - way).norm(), 1e-14);
+    EXPECT_LT((moved.velocity_at(x + way) - v).norm(), 1e-14);
+    EXPECT_LT((round.to_world(turned(local)) - turned(x)).norm(), 1e-14);
+    EXPECT_LT((round.velocity_at(turned(x)) - turned(v)).norm(), 1e-14);
+  }
 }
 
 TEST(Checks, AreChosenByName) {
