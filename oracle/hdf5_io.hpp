@@ -45,6 +45,9 @@ class Hdf5Reader {
   Eigen::Matrix3Xd matrix3(const std::string& path, std::int64_t n = -1) const;
   /// One entry of a [T,n,3] dataset as 3×n.
   Eigen::Matrix3Xd matrix3_at(const std::string& path, std::int64_t index) const;
+  /// One entry of a [T,n] dataset of reals, or of integers that int64 holds.
+  Eigen::VectorXd vector_at(const std::string& path, std::int64_t index) const;
+  IdVector integers_at(const std::string& path, std::int64_t index) const;
   /// [n] dataset of integers of any width; one beyond int64 is refused.
   IdVector integers(const std::string& path, std::int64_t n = -1) const;
   /// [n] dataset of strings.

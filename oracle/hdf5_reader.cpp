@@ -175,10 +175,10 @@ void check_storage(const Hdf5Reader& reader, const std::string& path, const Data
     check_chunks(reader, path, data, plist.get(), chunks, static_cast<std::size_t>(chunk_bytes));
 }
 
-/// Opens a dataset and holds it to class, rank, first extent (n >= 0) and, beyond rank 1, a last
-/// extent of 3.
+/// Opens a dataset and holds it to class, rank, first extent (n >= 0) and, of vectors beyond rank 1, a
+/// last extent of 3.
 Dataset open_dataset(const Hdf5Reader& reader, hid_t file, const std::string& path,
-                     H5T_class_t kind, std::size_t rank, std::int64_t n) {
+                     H5T_class_t kind, std::size_t rank, std::int64_t n, bool vectors = true) {
   Handle object = open_object(reader, file, path);
   if (H5Iget_type(object.get()) != H5I_DATASET) reader.fail(path, "a group", "a dataset");
   Dataset data{std::move(object), Handle(-1), Handle(-1), {}};
@@ -191,12 +191,13 @@ Dataset open_dataset(const Hdf5Reader& reader, hid_t file, const std::string& pa
                     data.dims.size() == rank &&
                     H5Sget_simple_extent_type(data.space.get()) != H5S_NULL &&
                     (rank < 1 || n < 0 || data.dims[0] == static_cast<hsize_t>(n)) &&
-                    (rank < 2 || data.dims.back() == 3);
+                    (rank < 2 || !vectors || data.dims.back() == 3);
   if (!fits) {
     const std::string first = n < 0 ? "N" : std::to_string(n);
     reader.fail(path, describe(data.type.get(), data.dims),
                 kind_name(kind) + (rank == 0   ? " scalar"
                                    : rank == 1 ? fmt::format(" [{}]", first)
+                                   : !vectors  ? fmt::format(" [{},N]", first)
                                    : rank == 2 ? fmt::format(" [{},3]", first)
                                                : fmt::format(" [{},N,3]", first)));
   }
@@ -332,6 +333,39 @@ Eigen::Matrix3Xd Hdf5Reader::matrix3_at(const std::string& path, std::int64_t in
   if (values.size() > 0 && H5Dread(data.id.get(), H5T_NATIVE_DOUBLE, memory.get(), data.space.get(),
                                    H5P_DEFAULT, values.data()) < 0)
     fail(path, hdf5_message(), "readable; the file is damaged");
+  return values;
+}
+
+namespace {
+
+/// Row `index` of a [T,n] dataset. \param memory_type  of `values`, which get n entries
+template <class Vector>
+void read_row(const Hdf5Reader& reader, const std::string& path, const Dataset& data,
+              std::int64_t index, hid_t memory_type, Vector& values) {
+  if (index < 0 || static_cast<hsize_t>(index) >= data.dims[0])
+    reader.fail(path, describe(data.type.get(), data.dims), fmt::format("to hold entry {}", index));
+  values.resize(static_cast<Eigen::Index>(data.dims[1]));
+  const hsize_t start[2] = {static_cast<hsize_t>(index), 0}, count[2] = {1, data.dims[1]};
+  const Handle memory(H5Screate_simple(2, count, nullptr));
+  H5Sselect_hyperslab(data.space.get(), H5S_SELECT_SET, start, nullptr, count, nullptr);
+  if (values.size() > 0 && H5Dread(data.id.get(), memory_type, memory.get(), data.space.get(),
+                                   H5P_DEFAULT, values.data()) < 0)
+    reader.fail(path, hdf5_message(), "readable; the file is damaged");
+}
+
+}  // namespace
+
+Eigen::VectorXd Hdf5Reader::vector_at(const std::string& path, std::int64_t index) const {
+  const Dataset data = open_dataset(*this, id_, path, H5T_FLOAT, 2, -1, false);
+  Eigen::VectorXd values;
+  read_row(*this, path, data, index, H5T_NATIVE_DOUBLE, values);
+  return values;
+}
+
+IdVector Hdf5Reader::integers_at(const std::string& path, std::int64_t index) const {
+  const Dataset data = open_dataset(*this, id_, path, H5T_INTEGER, 2, -1, false);
+  IdVector values;
+  read_row(*this, path, data, index, H5T_NATIVE_INT64, values);
   return values;
 }
 

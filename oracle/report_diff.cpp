@@ -2,7 +2,10 @@
 /// Pairs of rows, and how a person reads them.
 #include "oracle/report_diff.hpp"
 
+#include "reference/error.hpp"
+
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -146,6 +149,33 @@ ReportDiff difference(const Report& before, const Report& after, double factor) 
     });
   compare_provenance(before, after, diff);
   return diff;
+}
+
+void pair_backends(Report& before, Report& after, const std::string& from, const std::string& to) {
+  const auto rename = [&](Report& report, const std::string& name) {
+    bool any = false;
+    for (CheckRow& row : report.rows) {
+      if (row.backend != name && backend_label(row) != name) continue;
+      any = true;
+      row.backend = fmt::format("{} = {}", from, to);
+      row.options.clear();
+      row.executor.clear();
+    }
+    if (!any)
+      throw InputError("command line", "--pair", from + "=" + to,
+                       fmt::format("names of backends; there is no {} among {}", name,
+                                   fmt::join(backends_of(report), ", ")));
+  };
+  rename(before, from);
+  rename(after, to);
+}
+
+std::vector<std::string> backends_of(const Report& report) {
+  std::vector<std::string> names;
+  for (const CheckRow& row : report.rows)
+    if (std::find(names.begin(), names.end(), backend_label(row)) == names.end())
+      names.push_back(backend_label(row));
+  return names;
 }
 
 std::string diff_text(const ReportDiff& diff) {

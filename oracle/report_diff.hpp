@@ -37,6 +37,14 @@ struct ReportDiff {
 /// has moved beyond any factor. \param factor  >= 1
 ReportDiff difference(const Report& before, const Report& after, double factor = 2);
 
+/// Rows of backend `from` in `before` and of `to` in `after` become rows of one backend, "from = to",
+/// without options and executor, so that they are compared. A name is a backend's own or its label
+/// (backend_label). Throws InputError where a report has no such rows.
+void pair_backends(Report& before, Report& after, const std::string& from, const std::string& to);
+
+/// The labels of a report's backends, each once, in its order.
+std::vector<std::string> backends_of(const Report& report);
+
 /// For a terminal, at most 100 columns: verdicts that changed, rows that one report lacks, scores
 /// that moved, provenance; last one line for the whole.
 std::string diff_text(const ReportDiff& diff);

@@ -177,6 +177,31 @@ TEST(DiffCommand, ExitsWithOneWhereSomethingGotWorse) {
   EXPECT_EQ(out, "1 rows in both: 1 worse: worse\n");
 }
 
+TEST(DiffCommand, SaysThatNamesDifferAndHowToPairThem) {
+  const test::TemporaryFolder folder;
+  const std::string hash = (folder / "hash.h5").string(), mine = (folder / "mine.h5").string();
+  CheckRow its = row("density", 31, "mine");
+  its.executor = "";
+  write_report(hash, {{row("density", 0.5, "hash"), row("pressure", 0.5, "hash")}, {}});
+  write_report(mine, {{its}, {}});
+  try {
+    diff_command({hash, mine});
+    ADD_FAILURE() << "was not refused";
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.file(), mine);
+    EXPECT_EQ(error.value(), "mine ");
+    EXPECT_NE(error.bound().find("hash host"), std::string::npos) << error.bound();
+    EXPECT_NE(error.bound().find("--pair \"hash=mine\""), std::string::npos) << error.bound();
+  }
+  std::string out;
+  EXPECT_EQ(diff_command({hash, mine, "--pair", "hash=mine", "--quiet"}, &out), exit_does_not_conform);
+  EXPECT_EQ(out, "1 rows in both: 1 worse, 1 only before: worse\n");
+  EXPECT_EQ(diff_command({mine, hash, "--pair", "mine=hash host", "--quiet"}, &out), exit_pass);
+  EXPECT_THROW(diff_command({hash, mine, "--pair", "hash=brute"}), InputError);
+  EXPECT_THROW(diff_command({hash, mine, "--pair", "hash"}), InputError);
+  EXPECT_THROW(diff_command({hash, mine, "--spread", "pour"}), InputError);
+}
+
 TEST(DiffCommand, RefusesWhatIsNoReportAndAFactorBelowOne) {
   const test::TemporaryFolder folder;
   const std::string good = (folder / "good.h5").string();

@@ -26,7 +26,8 @@ void add_info_command(CLI::App& app, int& exit_status);
 /// `decant conform`: the conformance suite.
 void add_conform_command(CLI::App& app, int& exit_status);
 
-/// `decant diff`: what changed between two reports. Exit status 1 where a verdict got worse.
+/// `decant diff`: what changed between two reports, or where two pours part. Exit status 1 where a
+/// verdict got worse, or pours differ by more than their spread.
 void add_diff_command(CLI::App& app, int& exit_status);
 
 /// `decant bench`: what a substep costs.
