@@ -205,6 +205,19 @@ const std::vector<Aspect>& aspects() {
            return false;
          });
        }},
+      {"tilt that goes on after its keys",
+       [](const Fixture& f) {
+         const double now = f.scene.time_at(f.state.substep);
+         return any_tilt(f, [&](const Tilt& t) { return t.rate != 0 && now > t.keys.back().time; });
+       }},
+      {"tilt that oscillates",
+       [](const Fixture& f) { return any_tilt(f, [](const Tilt& t) { return t.oscillation.has_value(); }); }},
+      {"container that translates",
+       [](const Fixture& f) {
+         return any_container(f, [&](const Container& c) {
+           return pose_at(c, f.scene.time_at(f.state.substep)).linear_velocity.norm() > 0;
+         });
+       }},
       {"tilt about no axis of the world",
        [](const Fixture& f) {
          return any_tilt(f, [](const Tilt& t) { return t.axis.cwiseAbs().maxCoeff() < 1; });

@@ -57,6 +57,7 @@ Classes classes_of(const Fixture& fixture) {
     const SolidDistance solid(container);
     const Pose pose = pose_at(container, time);
     if (pose.angular_velocity.norm() > 0) set("moving wall");
+    if (pose.linear_velocity.norm() > 0) set("translating wall");
     if (std::holds_alternative<BoxShape>(container.shape) && !pose.rotation.isIdentity(0)) set("tilted box");
     if (container.tilt && container.tilt->keys.size() >= 3) set("tilt of three keys");
     for (Eigen::Index i = 0; i < x.cols(); ++i) {
@@ -101,7 +102,8 @@ std::string describe(const Genome& g) {
   std::string text = fmt::format("{} particle{}", g.points.size(), g.points.size() == 1 ? "" : "s");
   if (g.vessels.empty()) text += ", no walls";
   for (const Vessel& v : g.vessels) {
-    text += fmt::format(", {}{}", v.tilts ? "tilting " : "", form_names[static_cast<std::size_t>(v.form)]);
+    text += fmt::format(", {}{}{}", v.tilts ? "tilting " : "", v.translates ? "translating " : "",
+                        form_names[static_cast<std::size_t>(v.form)]);
     if (v.tilts && v.steps.size() > 1) text += fmt::format(" of {} keys", v.steps.size() + 1);
     if (v.belt != std::array<int, 3>{}) text += " that runs like a belt";
   }

@@ -169,6 +169,22 @@ void draw_tilt(Dice& dice, Vessel& v) {
   // Pauses and reversals too.
   for (int k = dice.whole(0, 5); k > 0; --k)
     v.steps.push_back({dice.whole(2, 24), dice.in(20) ? 0 : dice.whole(-48, 48)});
+  if (dice.in(25)) v.rate = dice.whole(-24, 24);
+  if (dice.in(25)) v.tilt_oscillation = {{dice.whole(-24, 24), 0, 0}, dice.whole(16, 200), dice.whole(-25, 25)};
+}
+
+void draw_translation(Dice& dice, Vessel& v, const std::array<int, 3>& along) {
+  const auto speed = [&](int most) {
+    std::array<int, 3> drawn = draw_vector(dice, most);
+    for (std::size_t a = 0; a < 3; ++a) drawn[a] *= along[a];
+    return drawn;
+  };
+  v.translates = 1;
+  v.translation_start = dice.whole(-30, 2);
+  for (int k = dice.whole(0, 4); k > 0; --k)
+    v.translation_steps.push_back({dice.whole(2, 24), dice.in(20) ? std::array<int, 3>{} : speed(24)});
+  if (dice.in(40)) v.velocity = speed(16);
+  if (dice.in(40)) v.translation_oscillation = {speed(16), dice.whole(16, 200), dice.whole(-25, 25)};
 }
 
 Vessel draw_vessel(Dice& dice, bool revolved, int smallest, int largest) {
@@ -194,6 +210,8 @@ void draw_vessels(Dice& dice, Genome& g) {
   if (repeats && !revolved) {
     for (std::size_t a = 0; a < 3; ++a)
       if (g.periodic[a]) g.vessels[0].size[a] = period(dice, g, g.vessels[0].size[a]);
+    if (dice.in(20))
+      draw_translation(dice, g.vessels[0], {1 - g.periodic[0], 1 - g.periodic[1], 1 - g.periodic[2]});
     return;
   }
   for (int more = dice.in(25) ? dice.in(30) ? 2 : 1 : 0; more > 0; --more) {
@@ -203,8 +221,10 @@ void draw_vessels(Dice& dice, Genome& g) {
     v.shift = {dice.whole(-2, 2), dice.whole(-2, 2)};
     g.vessels.push_back(v);
   }
-  for (Vessel& v : g.vessels)
+  for (Vessel& v : g.vessels) {
     if (!repeats && dice.in(45)) draw_tilt(dice, v);
+    if (dice.in(20)) draw_translation(dice, v, {1, 1, 1});
+  }
   g.reversed = g.vessels.size() > 1 && dice.in(50);
 }
 

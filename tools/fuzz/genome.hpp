@@ -35,6 +35,21 @@ struct TiltStep {
   bool operator==(const TiltStep&) const = default;
 };
 
+/// A key of a translation schedule after the first.
+struct TranslationStep {
+  int substeps = 1;             // after the key before it, 1 …
+  std::array<int, 3> speed{};   // at its fastest, c0/256, −24 … 24
+  bool operator==(const TranslationStep&) const = default;
+};
+
+/// An oscillation.
+struct Oscillating {
+  std::array<int, 3> speed{};   // at its fastest, c0/256; of a tilt the first alone, of the farthest point
+  int period = 40, phase = 0;   // substeps, eighths of a radian
+  bool operator==(const Oscillating&) const = default;
+  bool any() const { return speed != std::array<int, 3>{}; }
+};
+
 struct Vessel {
   Form form = Form::tank;
   std::array<int, 3> size = {5, 5, 5};  // of its room, in dx
@@ -49,6 +64,13 @@ struct Vessel {
   int angle = 0;                      // of the first key, eighths of a radian, −16 … 16
   int start = 0;                      // of the first key, substeps from the state's
   std::vector<TiltStep> steps;        // the keys after it
+  int rate = 0;                       // after the last, as a step's speed
+  Oscillating tilt_oscillation;
+  int translates = 0;                 // 1: it has a translation schedule
+  int translation_start = 0;          // of the first key, substeps from the state's
+  std::vector<TranslationStep> translation_steps;
+  std::array<int, 3> velocity{};      // after the last key, c0/256
+  Oscillating translation_oscillation;
   bool operator==(const Vessel&) const = default;
 };
 
@@ -95,11 +117,11 @@ Genome random_genome(std::uint64_t seed);
 Fixture problem_of(const Genome& genome, const std::string& name);
 
 /// What a problem has that ports trip over, by name, in this order.
-inline constexpr std::array<const char*, 23> class_names = {
+inline constexpr std::array<const char*, 24> class_names = {
     "walls",          "moving wall",   "belt",         "contact",  "periodic",
     "far away",       "isolated",      "crowded",      "coincident", "on cell faces",
     "outlier",        "negative side", "tension",      "floor",        "one or none",
-    "tilted box",     "tilt of three keys",  "slanted outline",   "several containers",
+    "tilted box",     "translating wall",  "tilt of three keys",  "slanted outline",   "several containers",
     "at wall and floor",  "periods that differ",  "calibrated mass",  "gravity not down"};
 using Classes = std::array<bool, class_names.size()>;
 Classes classes_of(const Fixture& fixture);

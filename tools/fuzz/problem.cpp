@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace decant::fuzz {
 namespace {
@@ -66,6 +67,31 @@ Vec3 middle_of(const Vessel& v, double dx) {
   return middle;
 }
 
+/// \param fastest  rad/s or m/s, its derivative's amplitude
+template <class Value>
+Oscillation<Value> oscillation_of(const Oscillating& o, const Value& fastest, double dt) {
+  const double period = o.period * dt;
+  return {period / (2 * std::numbers::pi) * fastest, 1 / period, o.phase / 8.0};
+}
+
+Translation translation_of(const Genome& g, const Vessel& v, double sound_speed, double dt) {
+  Translation t;
+  int substep = std::max(0, g.substep + v.translation_start);
+  Vec3 offset = Vec3::Zero();
+  t.keys.clear();
+  t.keys.push_back({substep * dt, offset});
+  for (const TranslationStep& step : v.translation_steps) {
+    substep += step.substeps;
+    offset += sound_speed / 256 * step.substeps * dt / 1.5 * real(step.speed);
+    t.keys.push_back({substep * dt, offset});
+  }
+  t.velocity = sound_speed / 256 * real(v.velocity);
+  if (v.translation_oscillation.any())
+    t.oscillation = oscillation_of<Vec3>(v.translation_oscillation,
+                                         sound_speed / 256 * real(v.translation_oscillation.speed), dt);
+  return t;
+}
+
 /// A container whose room has its middle in `middle` at the state's time, upright or turned.
 Container container_of(const Genome& g, const Vessel& v, std::size_t k, const Scene& scene, const Vec3& middle) {
   const double dx = scene.particle_spacing;
@@ -94,26 +120,37 @@ Container container_of(const Genome& g, const Vessel& v, std::size_t k, const Sc
   c.surface_velocity = scene.fluid.sound_speed / 64 * real(v.belt);
   const Vec3 local_middle = middle_of(v, dx);
   c.origin = middle - local_middle;
+  const double dt = scene.time_step(), now = scene.time_at(g.substep);
+  // Before it translates it stands where it comes to the middle at the state's time.
+  Vec3 start = middle;
+  if (v.translates) {
+    c.translation = translation_of(g, v, scene.fluid.sound_speed, dt);
+    start -= translation_at(*c.translation, now).offset;
+    c.origin = start - local_middle;
+  }
   if (!v.tilts) return c;
   double farthest = 0;
   for (const Ring& ring : solid_rings(c))
     farthest = std::max(farthest, (ring.center - local_middle).norm() + ring.radius);
   const Vec3 pivot = dx * real(v.pivot);
   farthest += pivot.norm();
-  Tilt tilt{middle + pivot, real(v.axis).normalized(), {}};
-  const double dt = scene.time_step();
+  const double unit = scene.fluid.sound_speed / 256 / farthest;  // rad/s
+  Tilt tilt{start + pivot, real(v.axis).normalized(), {}};
   int substep = std::max(0, g.substep + v.start);
   double angle = v.angle / 8.0;
   tilt.keys.push_back({substep * dt, angle});
   for (const TiltStep& step : v.steps) {
     substep += step.substeps;
     // A smoothstep is one and a half times as fast in its middle as on average.
-    angle += step.speed / 256.0 * scene.fluid.sound_speed * step.substeps * dt / (1.5 * farthest);
+    angle += step.speed * unit * step.substeps * dt / 1.5;
     tilt.keys.push_back({substep * dt, angle});
   }
-  const double now = tilt_at(tilt, scene.time_at(g.substep)).angle;
-  const Eigen::AngleAxisd turned(now, tilt.axis);
-  c.origin = tilt.pivot + turned.inverse() * (middle - turned * local_middle - tilt.pivot);
+  tilt.rate = v.rate * unit;
+  if (v.tilt_oscillation.any())
+    tilt.oscillation =
+        oscillation_of<double>(v.tilt_oscillation, v.tilt_oscillation.speed[0] * unit, dt);
+  const Eigen::AngleAxisd turned(tilt_at(tilt, now).angle, tilt.axis);
+  c.origin = tilt.pivot + turned.inverse() * (start - turned * local_middle - tilt.pivot);
   c.tilt = tilt;
   return c;
 }
@@ -215,11 +252,11 @@ Fixture problem_of(const Genome& g, const std::string& name) {
   scene.contact = {(5 + g.contact) / 20.0, g.restitution / 10.0, g.friction / 10.0};
   scene.wall_layers = g.layers;
   for (std::size_t a = 0; a < 3; ++a) scene.domain.periodic[a] = g.periodic[a] != 0;
-  // As long as states are late, so that nothing is done after the end.
+  // A little longer than the state is late, so that nothing is done after the end, nor goes on for long.
   scene.schedule.frames = g.frames;
   scene.schedule.courant = g.courant / 10.0;
   scene.schedule.max_speed = 0.25 * scene.fluid.sound_speed;
-  scene.schedule.end = 1040 * longest_time_step(scene, scene.schedule.courant, *scene.schedule.max_speed);
+  scene.schedule.end = (g.substep + 50) * longest_time_step(scene, scene.schedule.courant, *scene.schedule.max_speed);
   scene.schedule.substeps_per_frame = substeps_for(scene);
 
   // Powers of two, so that every point of the lattice is one of fp32's.

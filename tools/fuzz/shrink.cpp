@@ -89,6 +89,17 @@ class Shrinking {
       attempt(of([](Vessel& v) { v.steps = {}; }));
       for (std::size_t last = best_.genome.vessels[k].steps.size(); last-- > 0;)
         attempt(of([last](Vessel& v) { v.steps.erase(v.steps.begin() + static_cast<std::ptrdiff_t>(last)); }));
+      attempt(of([](Vessel& v) { v.rate = 0; }));
+      attempt(of([](Vessel& v) { v.tilt_oscillation = {}; }));
+      attempt(of([](Vessel& v) {
+        v.translates = 0;
+        v.translation_steps = {};
+        v.velocity = {};
+        v.translation_oscillation = {};
+      }));
+      attempt(of([](Vessel& v) { v.translation_steps = {}; }));
+      attempt(of([](Vessel& v) { v.velocity = {}; }));
+      attempt(of([](Vessel& v) { v.translation_oscillation = {}; }));
       attempt(of([](Vessel& v) { v.belt = {}; }));
       attempt(of([](Vessel& v) { v.pivot = {}; }));
       attempt(of([](Vessel& v) { v.axis = {0, 1, 0}; }));
