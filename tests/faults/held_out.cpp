@@ -7,22 +7,34 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <compare>
 
 namespace decant {
 namespace {
 
-/// Names of the recordings that hold all fields, the smallest first.
-std::vector<std::string> small_fixtures(const std::filesystem::path& folder) {
-  std::vector<std::pair<Eigen::Index, std::string>> found;
+struct Recording {
+  Eigen::Index particles;
+  std::string name;
+  auto operator<=>(const Recording&) const = default;
+
+  /// Brute force shares all but its search with the others, and takes a hundred times as long where there
+  /// are many.
+  std::vector<std::string> backends() const {
+    if (particles < 2000) return {"brute", "hash", "list"};
+    return {"hash", "list"};
+  }
+};
+
+/// The recordings that hold all fields, the smallest first.
+std::vector<Recording> small_fixtures(const std::filesystem::path& folder) {
+  std::vector<Recording> found;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     if (entry.path().extension() != ".h5") continue;
     const Fixture fixture = read_fixture(entry.path());
-    if (fixture.fields) found.emplace_back(fixture.state.size(), entry.path().stem().string());
+    if (fixture.fields) found.push_back({fixture.state.size(), entry.path().stem().string()});
   }
   std::sort(found.begin(), found.end());
-  std::vector<std::string> names;
-  for (auto& [size, name] : found) names.push_back(std::move(name));
-  return names;
+  return found;
 }
 
 std::vector<std::string> split(const std::string& list) {
@@ -49,10 +61,10 @@ std::string judge_held_out(const nlohmann::json& faults, Executor executor, int 
     else
       planted.push_back(f);
   }
-  const std::vector<std::string> fixtures = small_fixtures(folder);
+  const std::vector<Recording> fixtures = small_fixtures(folder);
   std::vector<Trial> all;
   for (const auto& fixture : fixtures)
-    for (const char* backend : {"brute", "hash", "list"}) all.push_back({0, backend, fixture});
+    for (const auto& backend : fixture.backends()) all.push_back({0, backend, fixture.name});
   const auto prepared = prepare_all(all, folder);
 
   std::vector<std::string> by(planted.size());
@@ -76,8 +88,8 @@ std::string judge_held_out(const nlohmann::json& faults, Executor executor, int 
                           outcomes[t].ended.empty() ? joined(outcomes[t].failed, "") : outcomes[t].ended);
     }
   };
-  for (const auto& fixture : fixtures) round(fixture, {"brute", "hash", "list"});
-  for (const auto& fixture : fixtures) round(fixture, {});
+  for (const auto& fixture : fixtures) round(fixture.name, fixture.backends());
+  for (const auto& fixture : fixtures) round(fixture.name, {});
 
   std::size_t caught = 0, defaults = 0, equivalent = 0, wrong = 0;
   std::string table;
