@@ -41,12 +41,11 @@ class GridSearch {
                    {walls_have_cells(), !reuses_ && o_.source == SolverOptions::Source::rebuilt,
                     !large(), reach_},
                    scratch_);
-    if (capacity_ == 0) {
-      const double ratio = !reuses_ ? 1 : 1 + (o_.skin < 0 ? usual : o_.skin);
-      capacity_ = o_.capacity ? o_.capacity
-                              : static_cast<int>(std::ceil(41 * ratio * ratio * ratio / lanes_));
-      if (!o_.capacity && lanes_ > 1) capacity_ += 4;
-    }
+    // Whatever was loaded before: a run has the lists that its own problem makes it have.
+    const double ratio = !reuses_ ? 1 : 1 + (o_.skin < 0 ? usual : o_.skin);
+    capacity_ = o_.capacity ? o_.capacity
+                            : static_cast<int>(std::ceil(41 * ratio * ratio * ratio / lanes_));
+    if (!o_.capacity && lanes_ > 1) capacity_ += 4;
     reserve_lists();
   }
 

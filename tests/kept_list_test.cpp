@@ -37,6 +37,27 @@ std::string executor_name(const testing::TestParamInfo<Executor>& info) {
 }
 INSTANTIATE_TEST_SUITE_P(On, KeptList, testing::Values(Executor::host, Executor::cuda), executor_name);
 
+/// A cloud that falls in on itself, in one run. What lists that were too short spoiled must not show.
+TEST_P(KeptList, ThatOverflowsInARunLeavesTheBitsThatAmpleRoomLeaves) {
+  const Fixture f = read_fixture(DECANT_SOURCE_DIR "/fixtures/hostile-gathering.h5");
+  const auto run = [&](const std::string& name) {
+    const auto backend = make(name);
+    backend->load(f.scene, sample_walls(f.scene), f.state);
+    const auto bytes = backend->neighbor_stats().device_bytes;
+    EXPECT_TRUE(backend->advance(24).ok()) << name;
+    ParticleState end;
+    backend->read(end);
+    return std::pair(end, backend->neighbor_stats().device_bytes - bytes);
+  };
+  for (const std::string name : {"hash", "list"}) {
+    const auto [tight, grown] = run(name);
+    const auto [ample, grown_too] = run(name + ":capacity=400");
+    EXPECT_GT(grown, grown_too) << name;
+    EXPECT_TRUE(tight.position == ample.position) << name;
+    EXPECT_TRUE(tight.velocity == ample.velocity) << name;
+  }
+}
+
 /// Points a lattice spacing apart that fly the same way, in the open, with nothing that pulls at them.
 Fixture flight(const Vec3& velocity) {
   Fixture f = test::random_fixture(3);
