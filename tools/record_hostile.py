@@ -149,14 +149,14 @@ def states(rng):
     lattice = np.stack(np.meshgrid(*[np.arange(-4, 4)] * 3), -1).reshape(-1, 3)
     yield "exact-support", "hostile-exact", lattice * 2.0**-8
 
-    # Beside the wall of a turning cup, just beyond its reach.
+    # Beside the wall of a turning cup, mostly just beyond its reach, and so thin that nothing else moves it.
     beside = np.stack(np.meshgrid(np.arange(5), np.arange(6), np.arange(6)), -1).reshape(-1, 3)
-    beside = (beside + rng.uniform(-0.2, 0.2, beside.shape)) * 0.004 + [0.044, -0.01, -0.01]
+    beside = (beside + rng.uniform(-0.15, 0.15, beside.shape)) * 0.0052 + [0.0415, -0.013, -0.009]
     yield "fast-wall", "hostile-fast-wall", beside
 
     ball = np.stack(np.meshgrid(*[np.arange(-5, 6)] * 3), -1).reshape(-1, 3)
     ball = ball[np.sum(ball**2, axis=1) <= 25]
-    yield "gathering", "hostile-gathering", (ball + rng.uniform(-0.15, 0.15, ball.shape)) * 0.0046
+    yield "gathering", "hostile-gathering", (ball + rng.uniform(-0.15, 0.15, ball.shape)) * 0.004
 
 
 def motion(name, scene, position):
@@ -164,7 +164,7 @@ def motion(name, scene, position):
     if name == "fast-wall":
         return np.zeros_like(position), 0.0122
     if name == "gathering":
-        return -105.0 * position, 0.0
+        return -120.0 * position, 0.0
     velocity = np.random.default_rng(7).uniform(-0.2, 0.2, position.shape)
     return velocity, 0.2 if scene == "hostile-cup" else 0.0
 
