@@ -8,6 +8,7 @@
 /// thread-safe: one thread at a time.
 #pragma once
 
+#include "oracle/file_aside.hpp"
 #include "reference/state.hpp"
 
 #include <cstdint>
@@ -130,10 +131,9 @@ class Hdf5Writer {
   void dataset(const std::string& path, const Layout& layout, const void* values,
                std::string_view unit, std::string_view description);
   [[noreturn]] void fail(const std::string& object, const std::string& what) const;
-  void discard();
 
-  std::filesystem::path file_, temporary_;
-  int descriptor_ = -1;  // of the temporary file
+  // Opened with the writer, so that a place that cannot be written is known before the work.
+  FileAside out_;
   hid_t id_ = -1;
   int level_;
 };

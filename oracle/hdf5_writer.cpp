@@ -7,13 +7,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
-#include <cerrno>
-#include <cstring>
 #include <stdexcept>
-
-#include <fcntl.h>
-#include <unistd.h>
 
 namespace decant {
 namespace {
@@ -30,24 +24,6 @@ Handle utf8_type(std::size_t size) {
   return type;
 }
 
-/// Writes all bytes; false, with errno, where the system refuses.
-bool write_all(int descriptor, const char* bytes, std::size_t size) {
-  while (size > 0) {
-    const ssize_t written = ::write(descriptor, bytes, size);
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) return false;
-    bytes += written;
-    size -= static_cast<std::size_t>(written);
-  }
-  return true;
-}
-
-std::filesystem::path temporary_beside(const std::filesystem::path& file) {
-  static std::atomic<int> counter{0};
-  return file.parent_path() /
-         fmt::format(".{}.{}-{}.tmp", file.filename().string(), ::getpid(), counter.fetch_add(1));
-}
-
 }  // namespace
 
 struct Hdf5Writer::Layout {
@@ -56,38 +32,22 @@ struct Hdf5Writer::Layout {
 };
 
 Hdf5Writer::Hdf5Writer(std::filesystem::path file, int level)
-    : file_(std::move(file)), temporary_(temporary_beside(file_)), level_(level) {
+    : out_(std::move(file)), level_(level) {
   silence_hdf5();
-  if (file_.filename().empty() || std::filesystem::is_directory(file_))
-    throw std::runtime_error(file_.string() + ": is a folder, a file is to be written");
-  // Opened now, so that a place that cannot be written is known before the work.
-  descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (descriptor_ < 0)
-    throw std::runtime_error(
-        fmt::format("{}: cannot be written: {}", file_.string(), std::strerror(errno)));
   // In memory until commit: HDF5 1.10 crashes when a disk is full.
   const Handle access(H5Pcreate(H5P_FILE_ACCESS));
   H5Pset_fapl_core(access.get(), memory_step, false);
-  id_ = create_file(temporary_.string(), access).release();
-  if (id_ < 0) {
-    discard();
-    fail("file", hdf5_message());
-  }
+  id_ = create_file(out_.aside().string(), access).release();
+  if (id_ < 0) fail("file", hdf5_message());
 }
 
-Hdf5Writer::~Hdf5Writer() { discard(); }
-
-void Hdf5Writer::discard() {
-  if (id_ >= 0) H5Fclose(std::exchange(id_, -1));
-  if (descriptor_ >= 0) ::close(std::exchange(descriptor_, -1));
-  std::error_code ignored;
-  if (!temporary_.empty()) std::filesystem::remove(temporary_, ignored);
-  temporary_.clear();
+Hdf5Writer::~Hdf5Writer() {
+  if (id_ >= 0) H5Fclose(id_);
 }
 
 void Hdf5Writer::fail(const std::string& object, const std::string& what) const {
   throw std::runtime_error(
-      fmt::format("{}: {}: cannot be written: {}", file_.string(), object, what));
+      fmt::format("{}: {}: cannot be written: {}", out_.file().string(), object, what));
 }
 
 void Hdf5Writer::dataset(const std::string& path, const Layout& layout, const void* values,
@@ -239,22 +199,9 @@ void Hdf5Writer::commit() {
           ? -1
           : H5Fget_file_image(id_, nullptr, 0);
   if (size < 0) fail("file", hdf5_message());
-  if (!write_all(descriptor_, *static_cast<const char**>(memory), static_cast<std::size_t>(size)) ||
-      ::fsync(descriptor_) != 0 || ::close(std::exchange(descriptor_, -1)) != 0)
-    fail("file", std::strerror(errno));
-  std::error_code error;
-  std::filesystem::rename(temporary_, file_, error);
-  if (error) fail("file", error.message());
-  temporary_.clear();
-  discard();
-
-  // The file is whole either way, and some file systems refuse to sync a folder.
-  const auto folder = file_.parent_path();
-  const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor >= 0) {
-    ::fsync(descriptor);
-    ::close(descriptor);
-  }
+  out_.write({*static_cast<const char**>(memory), static_cast<std::size_t>(size)});
+  out_.commit();
+  H5Fclose(std::exchange(id_, -1));
 }
 
 }  // namespace decant

@@ -2,9 +2,9 @@
 /// What CI systems are told: every failing check fails there, and what did not run is no pass.
 #include "tools/junit.hpp"
 
+#include "oracle/file_aside.hpp"
 #include "tests/falling_points.hpp"
 #include "tests/python.hpp"
-#include "tools/csv_writer.hpp"
 
 #include <gtest/gtest.h>
 

@@ -2,15 +2,12 @@
 /// Rows to JSON, HDF5 and text.
 #include "tools/bench_rows.hpp"
 
+#include "oracle/file_aside.hpp"
 #include "oracle/hdf5_io.hpp"
 #include "version.hpp"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-
-#include <cstdio>
-#include <fstream>
-#include <stdexcept>
 
 namespace decant {
 namespace {
@@ -78,22 +75,21 @@ std::string to_text(const BenchRow& row) {
                      stages);
 }
 
-void write_bench_json(const std::string& file, const std::vector<BenchRow>& rows) {
+void write_bench_json(const std::string& file, const std::vector<BenchRow>& rows,
+                      const std::string& interrupted) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array(), made_by;
   for (const BenchRow& row : rows) list.push_back(to_json(row));
   for (const auto& [key, value] : provenance()) made_by[key] = value;
-  const nlohmann::ordered_json all = {{"decant_bench", 1}, {"rows", list}, {"provenance", made_by}};
-  const std::string aside = file + ".partial";
-  std::ofstream out(aside);
-  out << all.dump(2) << '\n';
-  out.close();
-  if (!out || std::rename(aside.c_str(), file.c_str()) != 0)
-    throw std::runtime_error("cannot write " + file);
+  nlohmann::ordered_json all = {{"decant_bench", 1}, {"rows", list}, {"provenance", made_by}};
+  if (!interrupted.empty()) all["interrupted"] = interrupted;
+  write_text_file(file, all.dump(2) + '\n');
 }
 
-void write_bench_hdf5(const std::string& file, const std::vector<BenchRow>& rows) {
+void write_bench_hdf5(const std::string& file, const std::vector<BenchRow>& rows,
+                      const std::string& interrupted) {
   Hdf5Writer out(file);
   out.attribute("/", "decant_bench", 1);
+  if (!interrupted.empty()) out.attribute("/", "interrupted", interrupted);
   const auto n = static_cast<Eigen::Index>(rows.size());
   const auto text = [&](const char* name, auto get, const char* description) {
     std::vector<std::string> values;

@@ -42,8 +42,10 @@ std::string to_text(const BenchRow& row);
 
 /// Both appear whole or not at all and hold this build's provenance. Throws std::runtime_error naming
 /// the file where it cannot be written.
-void write_bench_json(const std::string& file, const std::vector<BenchRow>& rows);
+void write_bench_json(const std::string& file, const std::vector<BenchRow>& rows,
+                      const std::string& interrupted = {});
 /// Columns of equal length in /rows, units as attributes.
-void write_bench_hdf5(const std::string& file, const std::vector<BenchRow>& rows);
+void write_bench_hdf5(const std::string& file, const std::vector<BenchRow>& rows,
+                      const std::string& interrupted = {});
 
 }  // namespace decant

@@ -2,12 +2,12 @@
 /// `decant conform`: every asked-for backend on every asked-for fixture, a table, a report, a
 /// status.
 #include "oracle/conform.hpp"
+#include "oracle/file_aside.hpp"
 #include "oracle/surroundings.hpp"
 #include "reference/error.hpp"
 #include "tools/backend_choice.hpp"
 #include "tools/build_provenance.hpp"
 #include "tools/commands.hpp"
-#include "tools/csv_writer.hpp"
 #include "tools/fixture_folder.hpp"
 #include "tools/junit.hpp"
 #include "tools/output_place.hpp"

@@ -2,16 +2,13 @@
 /// Formats frames as CSV.
 #include "tools/csv_writer.hpp"
 
+#include "oracle/file_aside.hpp"
 #include "reference/pose.hpp"
 
 #include <fmt/compile.h>
 #include <fmt/format.h>
 
-#include <cerrno>
-#include <cstdio>
 #include <iterator>
-#include <stdexcept>
-#include <system_error>
 
 namespace decant {
 namespace {
@@ -31,17 +28,6 @@ void append_text(fmt::memory_buffer& out, std::string_view text) {
 }
 
 }  // namespace
-
-void write_text_file(const std::filesystem::path& file, std::string_view text) {
-  const std::filesystem::path aside = file.string() + ".partial";
-  std::FILE* out = std::fopen(aside.c_str(), "wb");
-  const bool written = out && std::fwrite(text.data(), 1, text.size(), out) == text.size();
-  const bool closed = out && std::fclose(out) == 0;
-  if (!written || !closed)
-    throw std::runtime_error(aside.string() +
-                             ": cannot be written: " + std::generic_category().message(errno));
-  std::filesystem::rename(aside, file);
-}
 
 CsvWriter::CsvWriter(std::filesystem::path folder, const Scene& scene, const FrameLayout& layout)
     : folder_(std::move(folder)) {

@@ -29,8 +29,4 @@ class CsvWriter {
 /// Bytes to expect of a layout's CSV files.
 std::int64_t csv_bytes(const FrameLayout& layout);
 
-/// Replaces a file by one with this text: written aside, then renamed. Throws std::runtime_error
-/// naming the file.
-void write_text_file(const std::filesystem::path& file, std::string_view text);
-
 }  // namespace decant

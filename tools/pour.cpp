@@ -4,6 +4,7 @@
 
 #include "oracle/audit.hpp"
 #include "oracle/conform.hpp"
+#include "oracle/file_aside.hpp"
 #include "oracle/fixture.hpp"
 #include "reference/error.hpp"
 #include "reference/initial_state.hpp"

@@ -2,6 +2,7 @@
 /// Threads take seeds by turns, each with backends of its own; what they find is put in order after.
 #include "tools/fuzz/campaign.hpp"
 
+#include "oracle/file_aside.hpp"
 #include "reference/scene_file.hpp"
 #include "tools/build_provenance.hpp"
 #include "tools/recording.hpp"
@@ -14,7 +15,6 @@
 #include <chrono>
 #include <cmath>
 #include <exception>
-#include <fstream>
 #include <map>
 #include <mutex>
 #include <thread>
@@ -152,7 +152,7 @@ std::string write_problem(const std::filesystem::path& folder, const Genome& gen
   (void)record_answer(fixture, run_substeps, run_members);
   const auto file = folder / (name + ".h5");
   write_fixture(file, fixture);
-  std::ofstream(folder / (name + ".json")) << scene_to_json(fixture.scene);
+  write_text_file(folder / (name + ".json"), scene_to_json(fixture.scene));
   return file.string();
 }
 
