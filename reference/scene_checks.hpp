@@ -10,7 +10,7 @@
 namespace decant {
 
 /// Highest speed to expect, m/s: `schedule.max_speed` where given, else the greatest
-/// sqrt(v0² + 2 g Δ) of any fill. v0 is its first speed, or its container's fastest while it tilts;
+/// sqrt(v0² + 2 g Δ) of any fill. v0 is its first speed, or that of the fastest wall, whatever that holds;
 /// Δ the fall from the highest point that the initial fluid can be carried to over the tilt down to
 /// the floor (or, without a floor, to the lowest cavity bottom, or the domain). Throws InputError
 /// where gravity pulls along a periodic axis and no `max_speed` is given.

@@ -52,6 +52,16 @@ double fastest_start(const Fill& fill, const std::vector<Ring>& rings, const Con
   return fastest;
 }
 
+/// Greatest speed of any wall, whether it holds a fill or not, m/s: fluid that it meets is as fast. Of
+/// `own`, whose fluid moves along, the speed of the surface alone.
+double fastest_wall(const Scene& scene, const Container* own) {
+  double fastest = 0;
+  for (const auto& c : scene.containers)
+    fastest = std::max(fastest, c.surface_velocity.norm() +
+                                    (&c == own ? 0.0 : fastest_point(solid_rings(c), c)));
+  return fastest;
+}
+
 std::int64_t particles_at(Scene scene, double spacing) {
   scene.particle_spacing = spacing;
   try {
@@ -82,16 +92,12 @@ double expected_max_speed(const Scene& scene) {
                            std::string(1, "xyz"[a]) + " and no fall height bounds the speed");
   const Vec3 up = gravity > 0 ? Vec3(-scene.gravity / gravity) : Vec3::UnitZ();
   const double caught = gravity > 0 ? catching_elevation(scene, up) : 0.0;
-  double fastest = 0;
+  double fastest = scene.fills.empty() ? fastest_wall(scene, nullptr) : 0.0;
   for (const auto& fill : scene.fills) {
     const Container* container = container_of(scene, fill);
     const auto rings = fill_rings(fill, container);
-    double start = fastest_start(fill, rings, container);
+    double start = std::max(fastest_start(fill, rings, container), fastest_wall(scene, container));
     if (container) start = std::max(start, fastest_point(rings, *container));
-    for (const auto& c : scene.containers) {
-      start = std::max(start, c.surface_velocity.norm());
-      if (&c != container) start = std::max(start, fastest_point(solid_rings(c), c));
-    }
     double fall = 0;
     if (gravity > 0)
       fall = std::max(0.0, farthest_along(up, rings, container, scene.schedule.end) - caught);
