@@ -26,6 +26,37 @@ std::string value_at(const nlohmann::json& json, const std::string& pointer) {
   return json.contains(at) ? json.at(at).dump() : "nothing";
 }
 
+void write_part(Hdf5Writer& out, const PartOfFrame& part) {
+  out.matrix3("/part/looked_at", part.looked_at, "m", "particle, x y z, when walls were last looked at");
+  out.attribute("/part", "looked_at_substep", part.looked_at_substep);
+  out.attribute("/part", "solver_seconds", part.solver_seconds);
+  const AuditResult& audit = part.on_the_way;
+  out.attribute("/part", "deepest", audit.deepest);
+  out.attribute("/part", "deepest_particle", audit.deepest_particle);
+  out.attribute("/part", "inside", audit.inside);
+  out.attribute("/part", "crossed", audit.crossed);
+  out.attribute("/part", "first_crossed", audit.first_crossed);
+  out.attribute("/part", "max_speed", audit.max_speed);
+  out.attribute("/part", "fastest_particle", part.fastest_particle);
+}
+
+PartOfFrame read_part(const Hdf5Reader& in, std::int64_t particles) {
+  const auto integer = [&](const char* name) { return in.integer_attribute("/part", name); };
+  PartOfFrame part;
+  part.looked_at = in.matrix3("/part/looked_at", particles);
+  part.looked_at_substep = integer("looked_at_substep");
+  part.solver_seconds = in.real_attribute("/part", "solver_seconds");
+  AuditResult& audit = part.on_the_way;
+  audit.deepest = in.real_attribute("/part", "deepest");
+  audit.deepest_particle = integer("deepest_particle");
+  audit.inside = integer("inside");
+  audit.crossed = integer("crossed");
+  audit.first_crossed = integer("first_crossed");
+  audit.max_speed = in.real_attribute("/part", "max_speed");
+  part.fastest_particle = integer("fastest_particle");
+  return part;
+}
+
 }  // namespace
 
 void write_checkpoint(const std::filesystem::path& file, const Checkpoint& checkpoint) {
@@ -33,7 +64,9 @@ void write_checkpoint(const std::filesystem::path& file, const Checkpoint& check
   out.attribute("/", "schema", checkpoint_schema);
   out.attribute("/", "frame", checkpoint.frame);
   out.attribute("/", "substep", checkpoint.state.substep);
-  out.attribute("/", "csv", checkpoint.csv ? 1 : 0);
+  out.attribute("/", "csv", checkpoint.choices.csv ? 1 : 0);
+  out.attribute("/", "perturbation", std::int64_t{checkpoint.choices.perturbation});
+  out.attribute("/", "wall_seconds", checkpoint.wall_seconds);
   out.attribute("/", "scene_sha256", sha256_of_text(checkpoint.scene_json));
   out.attribute("/", "backend", checkpoint.backend.name);
   out.attribute("/", "options", checkpoint.backend.options);
@@ -44,6 +77,7 @@ void write_checkpoint(const std::filesystem::path& file, const Checkpoint& check
   out.matrix3("/state/position", checkpoint.state.position, "m", "particle, x y z");
   out.matrix3("/state/velocity", checkpoint.state.velocity, "m/s", "particle, x y z");
   checkpoint.timeline.write(out, "/timeline");
+  if (checkpoint.part) write_part(out, *checkpoint.part);
   out.commit();
 }
 
@@ -54,7 +88,10 @@ Checkpoint read_checkpoint(const std::filesystem::path& file) {
     in.fail("schema", std::to_string(schema), fmt::format("must be {}", checkpoint_schema));
   Checkpoint c;
   c.frame = in.integer_attribute("/", "frame");
-  c.csv = in.integer_attribute("/", "csv") != 0;
+  c.choices.csv = in.integer_attribute("/", "csv") != 0;
+  c.choices.perturbation =
+      static_cast<std::uint32_t>(in.integer_attribute("/", "perturbation"));
+  c.wall_seconds = in.real_attribute("/", "wall_seconds");
   c.scene_json = in.text("/scene");
   c.backend = {in.text_attribute("/", "backend"), in.text_attribute("/", "options"),
                in.text_attribute("/", "executor"), in.text_attribute("/", "device"),
@@ -69,11 +106,12 @@ Checkpoint read_checkpoint(const std::filesystem::path& file) {
   if (static_cast<std::int64_t>(c.timeline.rows.size()) != c.frame + 1)
     in.fail("/timeline/time", fmt::format("{} rows", c.timeline.rows.size()),
             fmt::format("must have {}", c.frame + 1));
+  if (in.has("/part/looked_at")) c.part = read_part(in, c.state.size());
   return c;
 }
 
 void check_same_pour(const std::filesystem::path& file, const Checkpoint& checkpoint,
-                     const Scene& scene, const BackendInfo& backend, bool csv) {
+                     const Scene& scene, const BackendInfo& backend, const PourChoices& choices) {
   const auto refuse = [&](const std::string& key, const std::string& now, const std::string& then) {
     throw InputError(file.string(), key, now, "the pour to resume was started with " + then);
   };
@@ -94,7 +132,11 @@ void check_same_pour(const std::filesystem::path& file, const Checkpoint& checkp
   if (backend.options != then.options)
     refuse("backend options", "\"" + backend.options + "\"", "\"" + then.options + "\"");
   if (backend.executor != then.executor) refuse("--executor", backend.executor, then.executor);
-  if (csv != checkpoint.csv) refuse("--csv", csv ? "yes" : "no", checkpoint.csv ? "yes" : "no");
+  const PourChoices& chosen = checkpoint.choices;
+  if (choices.csv != chosen.csv)
+    refuse("--csv", choices.csv ? "yes" : "no", chosen.csv ? "yes" : "no");
+  if (choices.perturbation != chosen.perturbation)
+    refuse("--perturb", std::to_string(choices.perturbation), std::to_string(chosen.perturbation));
 }
 
 }  // namespace decant

@@ -11,6 +11,7 @@
 #include <hdf5.h>
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include <bit>
 #include <cerrno>
@@ -131,19 +132,25 @@ std::uint64_t create_dataset(hid_t file, const DatasetPlan& d) {
   return offset;
 }
 
-/// Opens for writing and keeps other pours out until this one ends, however it ends. The kind of
-/// lock is not HDF5's own, so readers are let in.
+/// Opens for writing, making the file where it is missing and changing nothing in it, and keeps other
+/// pours out until this one ends, however it ends. The kind of lock is not HDF5's own, so readers are let
+/// in.
 int open_exclusively(const std::filesystem::path& file) {
-  const int descriptor = ::open(file.c_str(), O_RDWR | O_CLOEXEC);
+  const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (descriptor < 0) fail_errno(file, "cannot be opened");
   struct flock lock {};
   lock.l_type = F_WRLCK;
   lock.l_whence = SEEK_SET;
-  if (::fcntl(descriptor, F_OFD_SETLK, &lock) != 0 && (errno == EAGAIN || errno == EACCES)) {
-    ::close(descriptor);
-    throw InputError(file.string(), "frames", "in use", "another pour is writing this file");
-  }
-  return descriptor;
+  struct stat own {
+  }, named{};
+  const bool taken =
+      ::fcntl(descriptor, F_OFD_SETLK, &lock) != 0 && (errno == EAGAIN || errno == EACCES);
+  // Whoever had it before may have given the file its final name meanwhile.
+  const bool gone = ::fstat(descriptor, &own) != 0 || ::stat(file.c_str(), &named) != 0 ||
+                    own.st_ino != named.st_ino || own.st_dev != named.st_dev;
+  if (!taken && !gone) return descriptor;
+  ::close(descriptor);
+  throw InputError(file.string(), "frames", "in use", "another pour is writing this file");
 }
 
 std::uint64_t find_dataset(hid_t file, const std::filesystem::path& name, const DatasetPlan& d) {
@@ -221,6 +228,8 @@ FrameFile FrameFile::create(const std::filesystem::path& file, const Scene& scen
                             const FrameLayout& layout,
                             const std::map<std::string, std::string>& texts) {
   FrameFile out(file, layout);
+  // Before HDF5 empties it.
+  out.descriptor_ = open_exclusively(file);
   try {
     const Handle access = without_locks();
     const Handle id = create_file(file.string(), access);
@@ -231,7 +240,6 @@ FrameFile FrameFile::create(const std::filesystem::path& file, const Scene& scen
   } catch (const std::runtime_error& error) {
     fail(file, error.what());
   }
-  out.descriptor_ = open_exclusively(file);
   // Reserves the room, so that the disk cannot fill up under a running pour. Not every file system
   // can; then only the estimate stands between the pour and a full disk.
   const off_t size = ::lseek(out.descriptor_, 0, SEEK_END);

@@ -9,25 +9,37 @@
 #include "oracle/backend.hpp"
 #include "reference/scene.hpp"
 #include "reference/state.hpp"
+#include "tools/limits.hpp"
 #include "tools/timeline.hpp"
 
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <vector>
 
 namespace decant {
+
+struct PourResult;
 
 struct PourOptions {
   std::filesystem::path out;
   bool csv = false, resume = false, quiet = false;
-  double checkpoint_seconds = 30;  // s, wall time between checkpoints; 0: at every frame
-  std::function<bool()> stop;      // asked after every frame; true: leave a checkpoint and return
+  double checkpoint_seconds = 30;  // s, wall time between checkpoints; 0: as often as can be
+  /// Asked after every stretch of a frame; true: leave a checkpoint and return. Where `leave` is given, asked
+  /// by another thread too.
+  std::function<bool()> stop;
+  /// Ends the process where a call of the backend's is still under way half a second after a stop: called
+  /// by another thread when the checkpoint is written, with what there is to say. `frame` is −1 where there
+  /// is no checkpoint yet.
+  std::function<void(const PourResult&)> leave;
   std::uint32_t perturbation = 0;  // not 0: from disturbed_start with this seed
 };
 
 struct PourResult {
-  bool finished = false;   // false: stopped, a checkpoint lies in the folder
-  std::int64_t frame = 0;  // the last one written
+  bool finished = false;     // false: stopped, a checkpoint lies in the folder
+  std::int64_t frame = 0;    // the last one written
+  std::int64_t substep = 0;  // of the checkpoint, maybe within the next frame
+  std::vector<LimitExceeded> limits_exceeded;
   Timeline timeline;
   PourSummary summary;
 };

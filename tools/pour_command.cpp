@@ -1,18 +1,19 @@
 /// \file
 /// `decant pour`: options, signals, and what is said in the end.
-#include "oracle/audit.hpp"
 #include "reference/error.hpp"
 #include "reference/scene_checks.hpp"
 #include "reference/scene_file.hpp"
 #include "tools/backend_choice.hpp"
 #include "tools/commands.hpp"
+#include "tools/particles_option.hpp"
 #include "tools/pour.hpp"
-#include "tools/progress.hpp"
+#include "tools/pour_report.hpp"
 #include "tools/stop_signal.hpp"
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
+#include <cstdio>
+#include <cstdlib>
 #include <memory>
 #include <optional>
 #include <string>
@@ -29,10 +30,11 @@ struct PourArguments {
 };
 
 constexpr const char* footer =
-    "Ctrl-C stops at the next frame and leaves a checkpoint; the same command with --resume goes "
-    "on\n"
-    "and ends in the same bits. A second Ctrl-C ends at once; the checkpoint before it still "
-    "holds.\n"
+    "Ctrl-C stops within a second, inside a frame too, and leaves a checkpoint; the same command with\n"
+    "--resume goes on and ends in the same bits. A second Ctrl-C ends at once; the checkpoint before it\n"
+    "still holds.\n"
+    "A run that leaves what its time step and its speed of sound were chosen for says so, with the first\n"
+    "frame and particle: limits_exceeded in --json.\n"
     "Exit status 1 where mass does not add up or a particle passed a wall, 130 after Ctrl-C.\n"
     "\n"
     "Example:\n"
@@ -45,10 +47,8 @@ Scene scene_of(const PourArguments& arguments) {
                        fmt::format("must be 1 … {}", most));
   };
   Scene scene = load_scene(arguments.scene);
-  if (arguments.particles) {
-    at_least_one("--particles", *arguments.particles, 1'000'000'000);
-    scene = with_particles(scene, *arguments.particles);
-  }
+  if (arguments.particles)
+    scene = with_asked_particles(scene, *arguments.particles, arguments.scene);
   if (arguments.frames) {
     at_least_one("--frames", *arguments.frames, 1'000'000);
     scene = with_frames(scene, static_cast<int>(*arguments.frames));
@@ -59,84 +59,25 @@ Scene scene_of(const PourArguments& arguments) {
   return scene;
 }
 
-nlohmann::ordered_json to_json(const PourResult& result, const BackendInfo& info,
-                               const std::string& out) {
-  const PourSummary& s = result.summary;
-  nlohmann::ordered_json places, stages;
-  for (std::size_t p = 0; p < place_names.size(); ++p)
-    places[place_names[p]] = {{"mass_kg", s.mass_at[p]}, {"fraction", s.fraction_at[p]}};
-  for (const StageName& stage : stage_names) {
-    const StageTimes::Stage& time = result.timeline.stages.*stage.stage;
-    stages[stage.name] = {{"seconds", time.seconds}, {"calls", time.calls}};
-  }
-  return {
-      {"out", out},
-      {"finished", result.finished},
-      {"backend", info.name},
-      {"options", info.options},
-      {"executor", info.executor},
-      {"device", info.device},
-      {"precision", info.precision},
-      {"particles", s.particles},
-      {"frames", s.frames},
-      {"substeps", s.substeps},
-      {"mass_kg", s.mass},
-      {"places", places},
-      {"mass_adds_up", s.balanced()},
-      {"unbalanced_frames", s.unbalanced_frames},
-      {"penetrated", s.penetrated()},
-      {"frames_inside_wall", s.frames_inside},
-      {"wall_crossings", s.crossings},
-      {"deepest_m", s.deepest},
-      {"penetration_frame", s.penetration_frame},
-      {"penetration_particle", s.penetration_particle},
-      {"kinetic_energy_end_J", s.final_kinetic_energy},
-      {"kinetic_energy_peak_J", s.peak_kinetic_energy},
-      {"kinetic_energy_peak_s", s.peak_kinetic_time},
-      {"max_speed_m_s", s.max_speed},
-      {"max_density_kg_m3", s.max_density},
-      {"solver_seconds", s.solver_seconds},
-      {"wall_seconds", s.wall_seconds},
-      {"substep_us", 1e6 * s.seconds_per_substep},
-      {"stages", stages},
-  };
-}
-
-void print(const PourResult& result, const BackendInfo& info, const Scene& scene) {
-  const PourSummary& s = result.summary;
-  fmt::print("{}: {} particles, {} frames, {} substeps of {:.3g} s; {} ({}) on {}\n", scene.name,
-             s.particles, s.frames, s.substeps, scene.time_step(), info.name, info.precision,
-             info.device);
-  for (std::size_t p = 0; p < place_names.size(); ++p)
-    fmt::print("  {:<10} {:9.3f} g {:7.2f} %\n", place_names[p], 1e3 * s.mass_at[p],
-               1e2 * s.fraction_at[p]);
-  fmt::print("  {:<10} {:9.3f} g, {}\n", "all", 1e3 * s.mass,
-             s.balanced() ? "added up at every frame"
-                          : fmt::format("DID NOT ADD UP at {} frames", s.unbalanced_frames));
-  if (s.penetrated())
-    fmt::print(
-        "  walls      PENETRATED first at frame {} by particle {}; {} frames with particles "
-        "inside a wall, {} crossings, deepest {:.3g} mm\n",
-        s.penetration_frame, s.penetration_particle, s.frames_inside, s.crossings, 1e3 * s.deepest);
-  else
-    fmt::print("  walls      nothing inside a wall and nothing through one at any frame\n");
-  fmt::print("  energy     kinetic {:.3g} J at the end, peak {:.3g} J at {:.3f} s\n",
-             s.final_kinetic_energy, s.peak_kinetic_energy, s.peak_kinetic_time);
-  fmt::print("  extremes   {:.3g} m/s, {:.1f} kg/m³\n", s.max_speed, s.max_density);
-  fmt::print("  time       {} in all; solver {:.4g} µs a substep", duration_text(s.wall_seconds),
-             1e6 * s.seconds_per_substep);
-  for (const StageName& stage : stage_names)
-    if (const StageTimes::Stage& time = result.timeline.stages.*stage.stage; time.calls > 0)
-      fmt::print(", {} {:.4g}", stage.name, 1e6 * time.seconds / static_cast<double>(time.calls));
-  fmt::print("\n");
-}
-
 int run(PourArguments& arguments) {
   const Scene scene = scene_of(arguments);
   const auto backend =
       choose_backend(arguments.flags.applied_to(arguments.backend), arguments.executor);
   arguments.flags.require_used();
   const StopSignal signal;
+  const BackendInfo info = backend->info();
+  const auto tell_stopped = [&](const PourResult& result) {
+    if (arguments.json && result.frame >= 0)
+      fmt::print("{}\n", pour_json(result, info, arguments.out));
+    std::fflush(stdout);
+    if (!arguments.quiet && result.frame < 0)
+      fmt::print(stderr, "stopped before the first frame; nothing is kept\n");
+    else if (!arguments.quiet)
+      fmt::print(stderr,
+                 "stopped after frame {} of {}, at substep {}; the same command with --resume goes on\n",
+                 result.frame, scene.schedule.frames, result.substep);
+    return 128 + StopSignal::caught();
+  };
   PourOptions options;
   options.out = arguments.out;
   options.csv = arguments.csv;
@@ -144,17 +85,14 @@ int run(PourArguments& arguments) {
   options.resume = arguments.resume;
   options.quiet = arguments.quiet;
   options.stop = [] { return StopSignal::caught() != 0; };
+  options.leave = [&](const PourResult& result) { std::_Exit(tell_stopped(result)); };
   const PourResult result = pour(scene, *backend, options);
 
-  const BackendInfo info = backend->info();
-  if (arguments.json) fmt::print("{}\n", to_json(result, info, arguments.out).dump(2));
-  if (!result.finished) {
-    if (!arguments.quiet)
-      fmt::print(stderr, "stopped after frame {} of {}; the same command with --resume goes on\n",
-                 result.frame, scene.schedule.frames);
-    return 128 + StopSignal::caught();
-  }
-  if (!arguments.json && !arguments.quiet) print(result, info, scene);
+  if (!result.finished) return tell_stopped(result);
+  if (arguments.json)
+    fmt::print("{}\n", pour_json(result, info, arguments.out));
+  else if (!arguments.quiet)
+    print_pour(result, info, scene);
   const bool conforms = result.summary.balanced() && !result.summary.penetrated();
   return conforms ? exit_pass : exit_does_not_conform;
 }

@@ -9,7 +9,9 @@ volatile std::sig_atomic_t caught_signal = 0;
 
 extern "C" void on_signal(int signal) {
   caught_signal = signal;
-  std::signal(signal, SIG_DFL);
+  // Whichever comes next ends the program.
+  std::signal(SIGINT, SIG_DFL);
+  std::signal(SIGTERM, SIG_DFL);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include "tools/timeline.hpp"
 
 #include "reference/error.hpp"
+#include "tools/build_provenance.hpp"
 
 #include <fmt/format.h>
 
@@ -39,6 +40,8 @@ constexpr IntegerColumn integer_columns[] = {
     {"frame", "number of the frame; 0 is the initial state", &TimelineRow::frame},
     {"substep", "substeps since the start", &TimelineRow::substep},
     {"deepest_particle", "particle deepest inside a solid, or -1", &TimelineRow::deepest_particle},
+    {"fastest_particle", "particle of the largest speed, or -1", &TimelineRow::fastest_particle},
+    {"densest_particle", "particle of the largest density, or -1", &TimelineRow::densest_particle},
     {"inside", "particles inside a solid", &TimelineRow::inside},
     {"crossed", "particles whose path since the frame before leads through a wall",
      &TimelineRow::crossed},
@@ -70,7 +73,9 @@ TimelineRow timeline_row(std::int64_t frame, const Scene& scene, const ParticleS
   row.potential_energy = audit.potential_energy;
   row.max_speed = audit.max_speed;
   row.min_density = fields.density.minCoeff();
-  row.max_density = fields.density.maxCoeff();
+  Eigen::Index densest = -1;
+  row.max_density = fields.density.maxCoeff(&densest);
+  row.densest_particle = densest;
   row.max_pressure = fields.pressure.maxCoeff();
   row.deepest = audit.deepest;
   row.deepest_particle = audit.deepest_particle;
@@ -154,6 +159,7 @@ void write_timeline(const std::filesystem::path& file, const Timeline& timeline,
   out.text("/scene", scene_json, "canonical JSON");
   timeline.write(out, "");
   for (const auto& [name, text] : texts) out.attribute("/", name, text);
+  for (const auto& [name, text] : build_provenance()) out.attribute("/provenance", name, text);
   out.commit();
 }
 

@@ -24,6 +24,7 @@ struct TimelineRow {
   std::array<double, place_names.size()> mass_at{};             // kg, by Place
   double kinetic_energy = 0, potential_energy = 0;              // J
   double max_speed = 0;                                         // m/s
+  std::int64_t fastest_particle = -1, densest_particle = -1;    // of max_speed and max_density
   double min_density = 0, max_density = 0;                      // kg/m³
   double max_pressure = 0;                                      // Pa
   double deepest = 0;                                           // m, into a solid

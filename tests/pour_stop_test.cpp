@@ -1,0 +1,369 @@
+/// \file
+/// Pours in processes of their own: two that want the same folder, and such that are told to stop.
+#include "tools/pour.hpp"
+
+#include "gpu/backends.hpp"
+#include "oracle/file_aside.hpp"
+#include "oracle/hdf5_io.hpp"
+#include "reference/error.hpp"
+#include "reference/scene_file.hpp"
+#include "tests/falling_points.hpp"
+#include "tools/checkpoint.hpp"
+#include "tools/commands.hpp"
+#include "tools/folder_lock.hpp"
+#include "tools/stop_signal.hpp"
+#include "tools/stretches.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <functional>
+#include <sstream>
+#include <thread>
+
+namespace decant {
+namespace {
+
+namespace fs = std::filesystem;
+using test::FallingPoints;
+using test::TemporaryFolder;
+
+std::string bytes_of(const fs::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file).rdbuf();
+  return text.str();
+}
+
+/// A child that ends with what `work` returns, or 2 and 3 as the command does.
+class Process {
+ public:
+  explicit Process(const std::function<int()>& work) : id_(::fork()) {
+    if (id_ != 0) return;
+    int status = exit_failure;
+    try {
+      status = work();
+    } catch (const InputError& error) {
+      std::fprintf(stderr, "%s\n", error.what());
+      status = exit_bad_input;
+    } catch (...) {
+    }
+    ::_exit(status);
+  }
+  void signal(int number) const { ::kill(id_, number); }
+  /// Exit status, or −n after signal n.
+  int wait() const {
+    int status = 0;
+    EXPECT_EQ(::waitpid(id_, &status, 0), id_);
+    return WIFSIGNALED(status) ? -WTERMSIG(status) : WEXITSTATUS(status);
+  }
+
+ private:
+  pid_t id_;
+};
+
+int pour_command(const std::vector<std::string>& arguments) {
+  CLI::App app;
+  int status = -1;
+  add_pour_command(app, status);
+  std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
+  reversed.push_back("pour");
+  app.parse(reversed);
+  return status;
+}
+
+double seconds_of(const std::function<void()>& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+void wait_for(const fs::path& file) {
+  for (int k = 0; k < 1000 && !fs::exists(file); ++k)
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  ASSERT_TRUE(fs::exists(file));
+}
+
+/// Two scenes of different sizes, so that what one writes into the other's file shows.
+Scene small_scene(int frames) {
+  Scene scene = test::falling_points_scene(frames);
+  scene.fluid.sound_speed = 20;
+  scene.schedule.end = 0.002 * frames;
+  scene.schedule.substeps_derived = false;
+  scene.schedule.substeps_per_frame = 15;
+  return scene;
+}
+Scene wide_scene(int frames) {
+  Scene scene = small_scene(frames);
+  scene.name = "wide";
+  scene.fills[0].box->min.x() = -0.05;
+  return scene;
+}
+
+TEST(TwoPours, IntoOneFolderLeaveTheFilesOfTheOneThatWasFirst) {
+  const TemporaryFolder folder;
+  const std::string one = folder / "one.json", other = folder / "other.json";
+  write_text_file(one, scene_to_json(small_scene(6)));
+  write_text_file(other, scene_to_json(wide_scene(6)));
+  const auto pour_into = [&](const std::string& scene, const std::string& name) {
+    return pour_command({scene, "--out", folder / name, "--quiet", "--csv"});
+  };
+  ASSERT_EQ(Process([&] { return pour_into(one, "one"); }).wait(), 0);
+  ASSERT_EQ(Process([&] { return pour_into(other, "other"); }).wait(), 0);
+  for (int attempt = 0; attempt < 6; ++attempt) {
+    const std::string out = "both" + std::to_string(attempt);
+    const bool swapped = attempt % 2 == 1;
+    const Process first([&] { return pour_into(swapped ? other : one, out); });
+    const Process second([&] { return pour_into(swapped ? one : other, out); });
+    const int first_status = first.wait(), second_status = second.wait();
+    ASSERT_EQ(std::minmax(first_status, second_status), std::minmax(0, int{exit_bad_input}));
+    const bool is_one = (first_status == 0) != swapped;
+    for (const char* file : {"frames.h5", "frames.xdmf", "csv/fluid_000003.csv"})
+      EXPECT_TRUE(bytes_of(folder / out / file) == bytes_of(folder / (is_one ? "one" : "other") / file))
+          << file;
+    EXPECT_FALSE(fs::exists(folder / out / "csv/fluid_000007.csv"));
+  }
+}
+
+TEST(TwoPours, OfWhichOneRunsLeaveItsFileAlone) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene();
+  PourOptions options;
+  options.out = folder / "out";
+  options.quiet = true;
+  FallingPoints running;
+  // While the first is at its 20th substep the second is refused, and leaves every byte.
+  int refused = 0;
+  running.before_advance = [&](std::int64_t substep) {
+    if (substep != 20) return;
+    const std::string frames = bytes_of(options.out / "frames.h5.partial");
+    for (const bool resume : {false, true}) {
+      const int status = Process([&] {
+                           FallingPoints second;
+                           PourOptions its = options;
+                           its.resume = resume;
+                           return pour(scene, second, its).finished ? 0 : 1;
+                         }).wait();
+      refused += status == exit_bad_input;
+    }
+    EXPECT_TRUE(frames == bytes_of(options.out / "frames.h5.partial"));
+  };
+  EXPECT_TRUE(pour(scene, running, options).finished);
+  EXPECT_EQ(refused, 2);
+}
+
+TEST(FolderLock, IsLetGoByAProcessThatIsKilled) {
+  const TemporaryFolder folder;
+  fs::create_directory(folder / "out");
+  const Process holder([&] {
+    const FolderLock lock("--out", folder / "out");
+    write_text_file(folder / "held", "yes");
+    std::this_thread::sleep_for(std::chrono::seconds(60));
+    return 0;
+  });
+  wait_for(folder / "held");
+  EXPECT_THROW(FolderLock("--out", folder / "out"), InputError);
+  holder.signal(SIGKILL);
+  EXPECT_EQ(holder.wait(), -SIGKILL);
+  EXPECT_NO_THROW(FolderLock("--out", folder / "out"));
+  EXPECT_TRUE(fs::is_empty(folder / "out"));
+}
+
+TEST(FileAside, OfTwoThatWriteAtOnceOneIsThereWhole) {
+  const TemporaryFolder folder;
+  const fs::path file = folder / "text";
+  const auto write = [&](char letter) {
+    return Process([&, letter] {
+      for (int k = 0; k < 200; ++k) write_text_file(file, std::string(100'000, letter));
+      return 0;
+    });
+  };
+  write_text_file(file, std::string(100'000, 'c'));
+  const Process a = write('a'), b = write('b');
+  for (int k = 0; k < 200; ++k) {
+    const std::string text = bytes_of(file);
+    ASSERT_TRUE(text == std::string(100'000, text.at(0)));
+  }
+  EXPECT_EQ(a.wait() + b.wait(), 0);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder / ""), {}), 1);
+}
+
+/// A pour that its scene cannot interrupt: at the substep the backend works for a minute.
+int stuck_pour(const Scene& scene, const fs::path& out, std::int64_t stuck_at) {
+  const StopSignal signal;
+  FallingPoints backend;
+  backend.before_advance = [&](std::int64_t substep) {
+    if (substep < stuck_at) return;
+    write_text_file(out.string() + ".stuck", "");
+    const auto start = std::chrono::steady_clock::now();
+    while (std::chrono::steady_clock::now() - start < std::chrono::seconds(60)) {
+    }
+  };
+  PourOptions options;
+  options.out = out;
+  options.quiet = true;
+  options.stop = [] { return StopSignal::caught() != 0; };
+  options.leave = [](const PourResult&) { std::_Exit(128 + StopSignal::caught()); };
+  return pour(scene, backend, options).finished ? 0 : 128 + StopSignal::caught();
+}
+
+TEST(StoppedPour, LeavesACallThatTakesLongAndLosesNothingBeforeIt) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene();
+  FallingPoints whole, second;
+  PourOptions options;
+  options.quiet = true;
+  options.out = folder / "whole";
+  pour(scene, whole, options);
+  for (const int number : {SIGTERM, SIGINT}) {
+    options.out = folder / std::to_string(number);
+    const Process stuck([&] { return stuck_pour(scene, options.out, 35); });
+    wait_for(options.out.string() + ".stuck");
+    stuck.signal(number);
+    EXPECT_LT(seconds_of([&] { EXPECT_EQ(stuck.wait(), 128 + number); }), 1.0);
+    EXPECT_EQ(read_checkpoint(options.out / "checkpoint.h5").frame, 35 / 5);
+    options.resume = true;
+    EXPECT_TRUE(pour(scene, second, options).finished);
+    options.resume = false;
+    EXPECT_TRUE(bytes_of(options.out / "frames.h5") == bytes_of(folder / "whole/frames.h5"));
+  }
+}
+
+TEST(StoppedPour, EndsAtOnceWhenToldTwice) {
+  for (const int second : {SIGTERM, SIGINT}) {
+    const TemporaryFolder folder;
+    const Process stuck(
+        [&] { return stuck_pour(test::falling_points_scene(), folder / "out", 35); });
+    wait_for(folder / "out.stuck");
+    stuck.signal(SIGINT);
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    stuck.signal(second);
+    EXPECT_LT(seconds_of([&] { EXPECT_EQ(stuck.wait(), -second); }), 0.2);
+  }
+}
+
+/// A frame of a million substeps, which no one waits for.
+TEST(StoppedPour, StopsInsideAFrameAndGoesOnThereToTheSameBits) {
+  const TemporaryFolder folder;
+  const std::string file = folder / "scene.json";
+  Scene scene = small_scene(1);
+  scene.schedule.substeps_per_frame = 1'000'000;
+  write_text_file(file, scene_to_json(scene));
+  for (const char* backend : {"reference", "hash", "list"}) {
+    const std::string out = folder / backend;
+    const auto run = [&](bool resume) {
+      std::vector<std::string> all = {file,         "--out",     out,    "--backend",
+                                      backend,      "--quiet",   "--executor",
+                                      std::string(backend) == "reference" ? "auto" : "host"};
+      if (resume) all.push_back("--resume");
+      return Process([all] { return pour_command(all); });
+    };
+    // How far it gets depends on what else the machine does; that it stops does not.
+    std::int64_t before = 0;
+    int ahead = 0;
+    for (int attempt = 0; attempt < 7 && ahead < 2; ++attempt) {
+      const Process pouring = run(attempt > 0);
+      wait_for(out + "/checkpoint.h5");
+      std::this_thread::sleep_for(std::chrono::milliseconds(500 << attempt));
+      pouring.signal(SIGTERM);
+      EXPECT_LT(seconds_of([&] { EXPECT_EQ(pouring.wait(), 128 + SIGTERM); }), 1.0) << backend;
+      const Checkpoint left = read_checkpoint(out + "/checkpoint.h5");
+      EXPECT_EQ(left.frame, 0);
+      EXPECT_GE(left.state.substep, before) << backend;
+      EXPECT_EQ(left.state.substep % Stretches::longest, 0);
+      ahead += left.state.substep > before;
+      before = left.state.substep;
+    }
+    EXPECT_EQ(ahead, 2) << backend;
+  }
+}
+
+TEST(StoppedPour, InsideAFrameIsResumedToTheSameBitsAndTheSameTimeline) {
+  const TemporaryFolder folder;
+  Scene scene = small_scene(3);
+  scene.schedule.substeps_per_frame = 260;  // three stretches
+  for (const char* name : {"hash", "list"}) {
+    const auto backend = [&] { return make_backend(name, Executor::host); };
+    PourOptions options;
+    options.quiet = true;
+    options.out = folder / name / "whole";
+    ASSERT_TRUE(pour(scene, *backend(), options).finished);
+    for (const int stretches : {1, 2, 4, 8}) {
+      options.out = folder / name / ("parts" + std::to_string(stretches));
+      options.resume = false;
+      int asked = 0;
+      options.stop = [&] { return asked++ == stretches; };
+      const PourResult stopped = pour(scene, *backend(), options);
+      EXPECT_FALSE(stopped.finished);
+      EXPECT_EQ(stopped.substep, 260 * (stretches / 3) + 260 * (stretches % 3) / 3);
+      options.stop = {};
+      options.resume = true;
+      EXPECT_TRUE(pour(scene, *backend(), options).finished);
+      EXPECT_TRUE(bytes_of(options.out / "frames.h5") ==
+                  bytes_of(folder / name / "whole/frames.h5"))
+          << name << ", " << stretches;
+      const Hdf5Reader one(options.out / "timeline.h5"),
+          other(folder / name / "whole/timeline.h5");
+      for (const char* column : {"/max_speed", "/deepest", "/kinetic_energy", "/max_density"})
+        EXPECT_EQ(one.vector(column), other.vector(column)) << column;
+      for (const char* column : {"/crossed", "/fastest_particle", "/densest_particle"})
+        EXPECT_EQ(one.integers(column), other.integers(column)) << column;
+    }
+  }
+}
+
+TEST(ResumedPour, IsThatOfTheSameDisturbance) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene();
+  FallingPoints backend;
+  PourOptions options;
+  options.quiet = true;
+  options.out = folder / "out";
+  options.perturbation = 7;
+  options.stop = [] { return true; };
+  pour(scene, backend, options);
+  options.stop = {};
+  options.resume = true;
+  for (const std::uint32_t other : {0u, 8u}) {
+    options.perturbation = other;
+    try {
+      pour(scene, backend, options);
+      FAIL() << "must be refused";
+    } catch (const InputError& error) {
+      EXPECT_EQ(error.key(), "--perturb");
+      EXPECT_EQ(error.value(), std::to_string(other));
+    }
+  }
+  options.perturbation = 7;
+  EXPECT_TRUE(pour(scene, backend, options).finished);
+}
+
+TEST(Stretches, CoverAFrameMeetWhereWallsAreLookedAtAndStayShort) {
+  Scene scene = test::falling_points_scene(1);
+  scene.schedule.substeps_derived = false;
+  for (const int substeps : {1, 5, 99, 100, 101, 260, 7919, 1'000'000})
+    for (const double speed : {0.1, 3.0, 30.0, 3000.0}) {
+      scene.schedule.substeps_per_frame = substeps;
+      scene.schedule.max_speed = speed;
+      const Stretches stretches(scene);
+      std::int64_t done = 0, looks = 0;
+      while (done < substeps) {
+        ASSERT_TRUE(stretches.meet_at(done));
+        const std::int64_t end = stretches.end_of(done);
+        ASSERT_GT(end, done);
+        ASSERT_LE(end - done, Stretches::longest);
+        ASSERT_EQ(stretches.meet_at(end - 1), end - 1 == done) << end << " of " << substeps;
+        done = end;
+        looks += stretches.looks_at(done);
+      }
+      EXPECT_EQ(done, substeps);
+      // 0.04 m of wall, crossed twice at most between two looks.
+      const double needed = std::min(std::ceil(0.3 * speed / 0.08), double(substeps));
+      EXPECT_EQ(static_cast<double>(looks), std::max(needed, 1.0)) << substeps << " " << speed;
+    }
+}
+
+}  // namespace
+}  // namespace decant
