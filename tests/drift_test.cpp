@@ -189,12 +189,22 @@ TEST(Drift, AlongAPourLooksJustBeforeEachRebuildAndPassesThePhases) {
 TEST(Drift, OfWholePoursIsNothingForTheSameListAndSomethingForAnother) {
   Scene scene = test::falling_points_scene(40);
   int made = 0;
-  const auto pours = whole_pours(scene, plan_of({5}, {0}, 10, false), 2, [&](const std::string& o) {
-    auto backend = std::make_unique<test::FallingPoints>();
-    if (o.starts_with("rebuild=5")) backend->trouble_at = 150;
-    ++made;
-    return backend;
-  });
+  int parts = 0;
+  std::vector<WholePour> pours;
+  whole_pours(
+      scene, plan_of({5}, {0}, 10, false), 2,
+      [&](const std::string& o) {
+        auto backend = std::make_unique<test::FallingPoints>();
+        if (o.starts_with("rebuild=5")) backend->trouble_at = 150;
+        ++made;
+        return backend;
+      },
+      [&](const std::function<void()>& part) {
+        // What is done is there before the next is begun.
+        EXPECT_EQ(static_cast<int>(pours.size()), parts++);
+        part();
+      },
+      pours);
   ASSERT_EQ(pours.size(), 4u);
   EXPECT_EQ(made, 4);
   EXPECT_EQ(pours[0].energy_drift, 0);

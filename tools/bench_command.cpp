@@ -9,6 +9,7 @@
 #include "tools/bench_rows.hpp"
 #include "tools/commands.hpp"
 #include "tools/fixture_folder.hpp"
+#include "tools/interruptible.hpp"
 #include "tools/output_place.hpp"
 
 #include <fmt/format.h>
@@ -16,6 +17,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <memory>
 #include <optional>
 #include <string>
@@ -41,7 +43,7 @@ constexpr const char* footer =
     "backend that conforms settle them for a while: sizes that no recording has. The recording is what\n"
     "is judged.\n"
     "Exit status: 0 timed, 1 something does not conform, 2 bad input, 3 a backend failed,\n"
-    "77 the device of --executor is absent.\n"
+    "77 the device of --executor is absent, 130 after Ctrl-C (143: SIGTERM): what was timed by then is kept.\n"
     "\n"
     "Examples:\n"
     "  decant bench --backend brute,hash,list --executor cuda --json build/bench.json\n"
@@ -207,43 +209,62 @@ int bench(BenchArguments& arguments) {
   std::vector<std::filesystem::path> files(arguments.fixtures.begin(), arguments.fixtures.end());
   if (files.empty()) files = fixtures_in(fixture_folder(), false);
 
-  fmt::print("{}\n", bench_heading());
   std::vector<BenchRow> rows;
+  std::int64_t done = 0;
+  const auto all = static_cast<std::int64_t>(files.size() * backends.size());
+  const auto write = [&](const std::string& interrupted) {
+    if (!arguments.json.empty()) write_bench_json(arguments.json, rows, interrupted);
+    if (!arguments.report.empty()) write_bench_hdf5(arguments.report, rows, interrupted);
+  };
+  Interruptible work([&] {
+    const std::string line = interrupted_line(done, all, "timed or refused");
+    fmt::print("{}\n", line);
+    std::fflush(stdout);
+    write(line);
+  });
+  fmt::print("{}\n", bench_heading());
+  std::fflush(stdout);
   int status = exit_pass;
   for (const auto& file : files) {
     const Fixture fixture = read_fixture(file);
-    const Judgement oracle = prepare(fixture, timed_checks());
+    Judgement oracle;
+    work.part([&] { oracle = prepare(fixture, timed_checks()); });
     std::optional<Fixture> fine;  // made by the first backend that conforms, timed by all
     Walls fine_walls;
     for (const auto& backend : backends) {
       const BackendInfo info = backend->info();
       const std::string label = backend_label(info.name, info.options);
-      if (const std::string why = objection(*backend, fixture, oracle); !why.empty()) {
+      std::string why;
+      work.part([&] { why = objection(*backend, fixture, oracle); });
+      if (!why.empty()) {
         fmt::print("{:<28} does not conform, is not timed: {}\n", label, why);
         status = exit_does_not_conform;
+        ++done;
         continue;
       }
       try {
-        if (arguments.refine > 0) {
-          if (!fine) {
+        BenchRow row;
+        work.part([&] {
+          if (arguments.refine > 0 && !fine) {
             fine = refined(*backend, fixture, arguments.refine);
             fine_walls = sample_walls(fine->scene);
           }
-          rows.push_back(time_backend(*backend, *fine, fine_walls, arguments));
-        } else {
-          rows.push_back(time_backend(*backend, fixture, oracle.walls, arguments));
-        }
+          row = fine ? time_backend(*backend, *fine, fine_walls, arguments)
+                     : time_backend(*backend, fixture, oracle.walls, arguments);
+        });
+        rows.push_back(std::move(row));
       } catch (const BackendError& error) {
         fmt::print("{:<28} breaks down, is not timed: {}\n", label, error.what());
         status = exit_failure;
+        ++done;
         continue;
       }
+      ++done;
       fmt::print("{}\n", to_text(rows.back()));
       std::fflush(stdout);
     }
   }
-  if (!arguments.json.empty()) write_bench_json(arguments.json, rows);
-  if (!arguments.report.empty()) write_bench_hdf5(arguments.report, rows);
+  write("");
   return status;
 }
 

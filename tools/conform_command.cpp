@@ -9,6 +9,7 @@
 #include "tools/build_provenance.hpp"
 #include "tools/commands.hpp"
 #include "tools/fixture_folder.hpp"
+#include "tools/interruptible.hpp"
 #include "tools/junit.hpp"
 #include "tools/output_place.hpp"
 #include "tools/progress.hpp"
@@ -50,7 +51,8 @@ constexpr const char* footer =
     "Exit status: 0 all pass, 1 something does not conform, 2 bad input, 3 something could not "
     "run\n"
     "(a backend that breaks down while it is judged does not conform),\n"
-    "77 the device of --executor is absent.\n"
+    "77 the device of --executor is absent, 130 after Ctrl-C (143: SIGTERM): what was judged by then is in\n"
+    "table and report, the rest is not_run.\n"
     "\n"
     "--results judges fields that were computed elsewhere: what is given must pass; what is not given\n"
     "is not_run in the report and leaves the exit status alone (3 where nothing is given).\n"
@@ -112,25 +114,26 @@ std::vector<Fixture> fixtures_of(const ConformArguments& arguments) {
   return fixtures;
 }
 
-CheckRow row_that_did_not_run(const Candidate& candidate, const Fixture& fixture) {
+CheckRow row_that_did_not_run(const Candidate& candidate, const Fixture& fixture,
+                              const std::string& why) {
   CheckRow row;
   row.backend = candidate.info.name;
   row.executor = candidate.info.executor;
   row.device = candidate.info.device;
   row.fixture = fixture.name;
   row.check = "all";
-  row.reason = candidate.why_not;
+  row.reason = why;
   return row;
 }
 
-Report judge_all(std::vector<Candidate>& candidates, const std::vector<Fixture>& fixtures,
-                 const CheckSelection& checks, int look_every, bool quiet) {
-  Report report;
+/// Adds the rows of all, pair by pair. \param judged  pairs of backend and fixture whose rows are there
+void judge_all(std::vector<Candidate>& candidates, const std::vector<Fixture>& fixtures,
+               const CheckSelection& checks, int look_every, bool quiet, Interruptible& work,
+               Report& report, std::int64_t& judged) {
   const auto total = static_cast<std::int64_t>(candidates.size() * fixtures.size());
   const bool any = std::any_of(candidates.begin(), candidates.end(),
                                [](const Candidate& c) { return c.backend != nullptr; });
   Progress progress("judgement", total, 0, quiet);
-  std::int64_t done = 0;
   // The oracle is sequential: it works on the next fixture while backends are judged on this one.
   const auto prepared = [&](std::size_t k) {
     return std::async(std::launch::async, [&, k] {
@@ -142,16 +145,21 @@ Report judge_all(std::vector<Candidate>& candidates, const std::vector<Fixture>&
   for (std::size_t k = 0; k < fixtures.size(); ++k) {
     const Fixture& fixture = fixtures[k];
     std::unique_ptr<const Judgement> oracle;
-    if (any) oracle = next.get();
+    if (any) work.part([&] { oracle = next.get(); });
     if (any && k + 1 < fixtures.size()) next = prepared(k + 1);
     for (Candidate& candidate : candidates) {
-      progress.update(done++, fixture.name + " " + candidate.info.name);
+      progress.update(judged, fixture.name + " " + candidate.info.name);
       if (!candidate.backend) {
-        report.rows.push_back(row_that_did_not_run(candidate, fixture));
+        report.rows.push_back(row_that_did_not_run(candidate, fixture, candidate.why_not));
+        ++judged;
         continue;
       }
-      for (CheckRow& row : judge(*candidate.backend, fixture, *oracle, checks)) {
-        condense(row);
+      std::vector<CheckRow> rows;
+      work.part([&] {
+        rows = judge(*candidate.backend, fixture, *oracle, checks);
+        for (CheckRow& row : rows) condense(row);
+      });
+      for (CheckRow& row : rows) {
         if (!report.surroundings && is_located(row))
           report.surroundings = surroundings_of(
               fixture, oracle->walls, oracle->own.fields.density, row,
@@ -159,16 +167,27 @@ Report judge_all(std::vector<Candidate>& candidates, const std::vector<Fixture>&
               shown_radius * fixture.scene.support_radius());
         report.rows.push_back(std::move(row));
       }
+      ++judged;
     }
   }
   progress.update(total);
-  return report;
+}
+
+/// What was asked for and is not there is in the report too.
+void add_what_was_not_judged(const std::vector<Candidate>& candidates,
+                             const std::vector<Fixture>& fixtures, std::int64_t judged,
+                             Report& report) {
+  std::int64_t pair = 0;
+  for (const Fixture& fixture : fixtures)
+    for (const Candidate& candidate : candidates)
+      if (pair++ >= judged)
+        report.rows.push_back(row_that_did_not_run(candidate, fixture, "interrupted"));
 }
 
 void add_provenance(Report& report, const std::vector<Candidate>& candidates,
                     const std::vector<Fixture>& fixtures) {
   auto& p = report.provenance;
-  p = build_provenance();
+  p.merge(build_provenance());
   for (const auto& c : candidates)
     p["device." + c.info.name] = c.backend ? c.info.executor + ": " + c.info.device : c.why_not;
   for (const auto& f : fixtures) p["fixture_sha256." + f.name] = f.sha256;
@@ -296,18 +315,32 @@ int conform(ConformArguments& arguments) {
   auto candidates = candidates_of(arguments);
   const auto fixtures = fixtures_of(arguments);
   const bool talks = !arguments.quiet && !arguments.json;
+  Report report;
+  std::int64_t judged = 0;
+  const auto hand_over_all = [&](int status, const std::vector<Replay>& replays,
+                                 const std::string& more) {
+    add_provenance(report, candidates, fixtures);
+    hand_over(arguments, report, replays, status, "\n" + console_table(report) + more,
+              verdict_line(report) + (more.empty() ? "" : "\n" + more.substr(0, more.size() - 1)));
+  };
+  Interruptible work([&] {
+    add_what_was_not_judged(candidates, fixtures, judged, report);
+    const auto all = static_cast<std::int64_t>(candidates.size() * fixtures.size());
+    const std::string line = interrupted_line(judged, all, "judged");
+    report.provenance["interrupted"] = line;
+    if (talks) fmt::print(stderr, "\n");
+    hand_over_all(Interruptible::exit_status(), {}, line + "\n");
+  });
   if (talks)
     for (const auto& c : candidates)
       fmt::print("{}: {}\n", c.info.name,
                  c.backend ? fmt::format("{} on {}", c.info.executor, c.info.device) : c.why_not);
   std::fflush(stdout);
-
-  Report report = judge_all(candidates, fixtures, checks, arguments.look_every, !talks);
-  add_provenance(report, candidates, fixtures);
+  judge_all(candidates, fixtures, checks, arguments.look_every, !talks, work, report, judged);
   const int status = status_of(report, candidates);
   std::vector<Replay> replays;
   if (!arguments.surroundings.empty()) replays = replays_of(report, arguments.surroundings);
-  hand_over(arguments, report, replays, status, "\n" + console_table(report), verdict_line(report));
+  hand_over_all(status, replays, "");
   write_replays(replays, report, fixtures, talks);
   return status;
 }

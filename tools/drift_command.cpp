@@ -7,6 +7,7 @@
 #include "tools/commands.hpp"
 #include "tools/drift/drift.hpp"
 #include "tools/fixture_folder.hpp"
+#include "tools/interruptible.hpp"
 #include "tools/output_place.hpp"
 #include "tools/phases.hpp"
 #include "tools/progress.hpp"
@@ -15,6 +16,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <memory>
 #include <string>
 #include <vector>
@@ -53,7 +55,8 @@ constexpr const char* footer =
     "--recommend also tries, for each interval, the skin that theory asks for (*), and keeps half the\n"
     "tolerance for states that were not measured.\n"
     "Exit status: 0 measured, 1 --recommend finds nothing within the tolerance, 2 bad input, 3 a\n"
-    "backend failed, 77 the device of --executor is absent.\n"
+    "backend failed, 77 the device of --executor is absent, 130 after Ctrl-C (143: SIGTERM): what was\n"
+    "measured by then is in table and report.\n"
     "\n"
     "Examples:\n"
     "  decant drift --report build/drift.h5\n"
@@ -173,14 +176,27 @@ void run(DriftArguments& arguments, int& exit_status) {
   if (arguments.whole && scenes.empty())
     throw InputError("command line", "--whole", "given", "with a scene (*.json)");
   std::vector<PourDrift> pours;
+  std::vector<DriftResult> results;
+  Interruptible work([&] {
+    if (!arguments.quiet) fmt::print(stderr, "\n");
+    const std::string line =
+        interrupted_line(static_cast<std::int64_t>(results.size()),
+                         static_cast<std::int64_t>(states.size()), "windows measured");
+    fmt::print("{}{}{}\n", drift_table(results), pour_table(pours), line);
+    std::fflush(stdout);
+    if (!arguments.report.empty()) write_drift(arguments.report, results, pours, info, line);
+  });
   for (const Scene& scene : scenes) {
     Progress progress("pour", 1, 0, arguments.quiet);
     progress.update(0, scene.name);
     std::vector<Fixture> phases = phases_of(scene);
-    pours.push_back(along_pour(scene, plan, arguments.looks, make_list, phases));
+    PourDrift pour;
+    work.part([&] { pour = along_pour(scene, plan, arguments.looks, make_list, phases); });
+    pours.push_back(std::move(pour));
     for (Fixture& phase : phases) states.push_back(std::move(phase));
     if (arguments.whole)
-      pours.back().whole = whole_pours(scene, plan, disturbed_pours, make_list);
+      whole_pours(scene, plan, disturbed_pours, make_list, [&](const auto& part) { work.part(part); },
+                  pours.back().whole);
     progress.update(1, scene.name);
   }
   if (arguments.recommend)
@@ -189,12 +205,13 @@ void run(DriftArguments& arguments, int& exit_status) {
             return other.interval == list.interval && other.skin == list.skin;
           }))
         plan.lists.push_back(list);
-  std::vector<DriftResult> results;
   {
     Progress progress("window", static_cast<std::int64_t>(states.size()), 0, arguments.quiet);
     for (const Fixture& state : states) {
       progress.update(static_cast<std::int64_t>(results.size()), state.name);
-      results.push_back(measure_drift(state, plan, make_list));
+      DriftResult result;
+      work.part([&] { result = measure_drift(state, plan, make_list); });
+      results.push_back(std::move(result));
     }
     progress.update(static_cast<std::int64_t>(results.size()));
   }

@@ -33,7 +33,7 @@ std::string footer() {
       "Each seed gives a small scene and a hostile or harmless state in it. A campaign takes consecutive\n"
       "seeds; campaigns of disjoint seeds may run side by side, and tools/merge_fuzz.py joins their\n"
       "reports. What fails is shrunk and written as a fixture, which `decant conform` shows again, with\n"
-      "its scene beside it. Ctrl-C ends a campaign and keeps what it found.\n"
+      "its scene beside it. Ctrl-C ends a campaign and keeps what it found: exit status 130.\n"
       "\n"
       "Properties; where none is named, the dear ones are asked of every 4th or 8th problem:\n";
   for (const fuzz::Property& p : fuzz::properties())
@@ -122,6 +122,9 @@ void run(FuzzArguments& arguments, int& exit_status) {
   const bool holds = std::all_of(result.tallies.begin(), result.tallies.end(),
                                  [](const fuzz::Tally& t) { return t.failed == 0; });
   exit_status = holds ? exit_pass : exit_does_not_conform;
+  if (StopSignal::caught() == 0) return;
+  fmt::print("interrupted: {} problems asked\n", result.cases);
+  exit_status = 128 + StopSignal::caught();
 }
 
 }  // namespace

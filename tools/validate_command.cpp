@@ -4,6 +4,7 @@
 #include "tools/backend_choice.hpp"
 #include "tools/commands.hpp"
 #include "tools/fixture_folder.hpp"
+#include "tools/interruptible.hpp"
 #include "tools/output_place.hpp"
 #include "tools/progress.hpp"
 #include "tools/validation/validation.hpp"
@@ -11,8 +12,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace decant {
@@ -33,7 +36,8 @@ constexpr const char* footer =
     "but a port is judged by `decant conform`: passing here says that the physics is right, not that\n"
     "two solvers agree.\n"
     "Exit status: 0 every gate met, 1 some gate not met, 2 bad input, 3 a backend failed,\n"
-    "77 the device of --executor is absent.\n"
+    "77 the device of --executor is absent, 130 after Ctrl-C (143: SIGTERM): what was judged by then is in\n"
+    "table and report.\n"
     "\n"
     "Examples:\n"
     "  decant validate --list\n"
@@ -89,36 +93,55 @@ void run(ValidateArguments& arguments, int& exit_status) {
   const auto backend =
       choose_backend(arguments.flags.applied_to(arguments.backend), arguments.executor);
   arguments.flags.require_used();
-  std::vector<ValidationResult> results;
-  int broken = 0;
+  std::vector<std::pair<const ValidationCase*, int>> runs;
   for (const ValidationCase* which : chosen)
-    for (const int resolution : resolutions_of(*which, arguments, backend->info().executor)) {
-      const Scene scene = scene_of(*which, resolution, fixtures / "scenes");
-      Progress progress(fmt::format("{}/{} frame", which->name, resolution), scene.schedule.frames,
-                        0, arguments.quiet);
-      try {
-        results.push_back(run_case(*which, resolution, scene, *backend, fixtures / "experiments",
-                                   [&](int frame) { progress.update(frame); }));
-      } catch (const BackendError& trouble) {
-        // The other cases still tell something.
-        progress.pause();
-        fmt::print(stderr, "decant: {}/{}: {}\n", which->name, resolution, trouble.what());
-        ++broken;
-      }
-    }
-  if (results.empty() && broken == 0)
+    for (const int resolution : resolutions_of(*which, arguments, backend->info().executor))
+      runs.emplace_back(which, resolution);
+  if (runs.empty())
     throw InputError("command line", "CASE", "none",
                      "a case that this executor affords unasked; name a --resolution");
-  fmt::print("{}", validation_table(results));
-  int gates = 0, met = 0;
-  for (const auto& result : results)
-    for (const auto& quantity : result.quantities) {
-      gates += quantity.gated();
-      met += quantity.gated() && quantity.met();
+  std::vector<ValidationResult> results;
+  std::int64_t done = 0;
+  int broken = 0, gates = 0, met = 0;
+  const auto conclude = [&](const std::string& interrupted) {
+    fmt::print("{}", validation_table(results));
+    for (const auto& result : results)
+      for (const auto& quantity : result.quantities) {
+        gates += quantity.gated();
+        met += quantity.gated() && quantity.met();
+      }
+    fmt::print("\n{} of {} gates met{}\n", met, gates,
+               broken ? fmt::format("; {} broke down", broken) : "");
+    if (!interrupted.empty()) fmt::print("{}\n", interrupted);
+    std::fflush(stdout);
+    if (!arguments.report.empty()) write_validation(arguments.report, results, interrupted);
+  };
+  Interruptible work([&] {
+    if (!arguments.quiet) fmt::print(stderr, "\n");
+    conclude(interrupted_line(done, static_cast<std::int64_t>(runs.size()), "runs judged"));
+  });
+  for (const auto& one : runs) {
+    const ValidationCase& which = *one.first;
+    const int resolution = one.second;
+    const Scene scene = scene_of(which, resolution, fixtures / "scenes");
+    Progress progress(fmt::format("{}/{} frame", which.name, resolution), scene.schedule.frames, 0,
+                      arguments.quiet);
+    try {
+      ValidationResult result;
+      work.part([&] {
+        result = run_case(which, resolution, scene, *backend, fixtures / "experiments",
+                          [&](int frame) { progress.update(frame); });
+      });
+      results.push_back(std::move(result));
+    } catch (const BackendError& trouble) {
+      // The other cases still tell something.
+      progress.pause();
+      fmt::print(stderr, "decant: {}/{}: {}\n", which.name, resolution, trouble.what());
+      ++broken;
     }
-  fmt::print("\n{} of {} gates met{}\n", met, gates,
-             broken ? fmt::format("; {} broke down", broken) : "");
-  if (!arguments.report.empty()) write_validation(arguments.report, results);
+    ++done;
+  }
+  conclude("");
   exit_status = broken ? exit_failure : met == gates ? exit_pass : exit_does_not_conform;
 }
 

@@ -155,9 +155,13 @@ std::vector<ListChoice> derived_lists(const std::vector<Fixture>& fixtures,
 PourDrift along_pour(const Scene& scene, const DriftPlan& plan, int looks,
                      const ListMaker& make_list, std::vector<Fixture>& phases);
 
+/// Does one part of long work: calls what it is given, or never returns.
+using DoPart = std::function<void(const std::function<void()>& part)>;
+
 /// The whole pour by complete lists, by `disturbed` more whose start differs by rounding, and by each list.
-std::vector<WholePour> whole_pours(const Scene& scene, const DriftPlan& plan, int disturbed,
-                                   const ListMaker& make_list);
+/// They are added to `pours` one by one, each run a part of the work.
+void whole_pours(const Scene& scene, const DriftPlan& plan, int disturbed, const ListMaker& make_list,
+                 const DoPart& do_part, std::vector<WholePour>& pours);
 
 /// A run by another program: states, and the list that it used at each. Layout in
 /// oracle/list-series-format.md. Throws InputError.
@@ -178,8 +182,9 @@ std::unique_ptr<Recommendation> recommend(const std::vector<DriftResult>& result
 std::string drift_table(const std::vector<DriftResult>& results);
 std::string pour_table(const std::vector<PourDrift>& pours);
 
-/// Layout in oracle/drift-format.md.
+/// Layout in oracle/drift-format.md. \param interrupted  how far the work came; empty: it is complete
 void write_drift(const std::filesystem::path& file, const std::vector<DriftResult>& results,
-                 const std::vector<PourDrift>& pours, const BackendInfo& backend);
+                 const std::vector<PourDrift>& pours, const BackendInfo& backend,
+                 const std::string& interrupted = {});
 
 }  // namespace decant

@@ -173,11 +173,15 @@ void time_and_follow(const Fixture& fixture, const Walls& walls, int window,
   result.run_seconds = seconds_since(start);
 }
 
-std::vector<WholePour> whole_pours(const Scene& scene, const DriftPlan& plan, int disturbed,
-                                   const ListMaker& make_list) {
+void whole_pours(const Scene& scene, const DriftPlan& plan, int disturbed, const ListMaker& make_list,
+                 const DoPart& do_part, std::vector<WholePour>& pours) {
   const Walls walls = sample_walls(scene);
   const ParticleState start = initial_state(scene);
-  std::vector<WholePour> pours;
+  const auto run = [&](const ParticleState& from, const ListChoice& list) {
+    Course course;
+    do_part([&] { course = run_course(scene, walls, from, *make_list(verified(list))); });
+    return course;
+  };
   const auto add = [&](Course course, const ListChoice& list, std::uint32_t perturbation) {
     course.pour.fixture = scene.name;
     course.pour.list = list;
@@ -185,24 +189,21 @@ std::vector<WholePour> whole_pours(const Scene& scene, const DriftPlan& plan, in
     pours.push_back(course.pour);
   };
   const ListChoice complete{0, not_measured, false};
-  Course right = run_course(scene, walls, start, *make_list(verified(complete)));
+  Course right = run(start, complete);
   if (!right.pour.trouble.empty())
     throw BackendError(scene.name + ", complete lists: " + right.pour.trouble);
   compare(right, right);
   add(right, complete, 0);
   for (int k = 1; k <= disturbed; ++k) {
-    Course course =
-        run_course(scene, walls, disturbed_start(start, static_cast<std::uint32_t>(k)),
-                   *make_list(verified(complete)));
+    Course course = run(disturbed_start(start, static_cast<std::uint32_t>(k)), complete);
     compare(right, course);
     add(std::move(course), complete, static_cast<std::uint32_t>(k));
   }
   for (const ListChoice& list : plan.lists) {
-    Course course = run_course(scene, walls, start, *make_list(verified(list)));
+    Course course = run(start, list);
     compare(right, course);
     add(std::move(course), list, 0);
   }
-  return pours;
 }
 
 }  // namespace decant

@@ -259,13 +259,15 @@ std::string pour_table(const std::vector<PourDrift>& pours) {
 }
 
 void write_drift(const std::filesystem::path& file, const std::vector<DriftResult>& results,
-                 const std::vector<PourDrift>& pours, const BackendInfo& backend) {
+                 const std::vector<PourDrift>& pours, const BackendInfo& backend,
+                 const std::string& interrupted) {
   Hdf5Writer out(file);
   out.attribute("/", "decant_drift", 1);
   out.attribute("/", "backend", backend.name);
   out.attribute("/", "executor", backend.executor);
   out.attribute("/", "device", backend.device);
   for (const auto& [key, value] : build_provenance()) out.attribute("/provenance", key, value);
+  if (!interrupted.empty()) out.attribute("/provenance", "interrupted", interrupted);
   std::vector<DriftRow> rows;
   std::vector<Placed> samples, moments;
   std::vector<SafeInterval> safe;

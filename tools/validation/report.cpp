@@ -70,10 +70,12 @@ std::string validation_table(const std::vector<ValidationResult>& results) {
 }
 
 void write_validation(const std::filesystem::path& file,
-                      const std::vector<ValidationResult>& results) {
+                      const std::vector<ValidationResult>& results,
+                      const std::string& interrupted) {
   Hdf5Writer out(file);
   out.attribute("/", "decant_validation", 1);
   for (const auto& [key, value] : build_provenance()) out.attribute("/provenance", key, value);
+  if (!interrupted.empty()) out.attribute("/provenance", "interrupted", interrupted);
 
   const auto column = [](const auto& rows, auto get) {
     std::vector<std::string> values;

@@ -117,7 +117,9 @@ std::vector<ObservedOrder> observed_orders(const std::vector<ValidationResult>& 
 std::string validation_table(const std::vector<ValidationResult>& results);
 
 /// Everything that was found, with curves; layout in oracle/validation-format.md. Appears whole or not at all.
+/// \param interrupted  how far the work came; empty: it is complete
 void write_validation(const std::filesystem::path& file,
-                      const std::vector<ValidationResult>& results);
+                      const std::vector<ValidationResult>& results,
+                      const std::string& interrupted = {});
 
 }  // namespace decant
