@@ -237,12 +237,14 @@ JudgedResults judge_named_fields(const std::filesystem::path& reference,
     return std::find(states.begin(), states.end(), state) != states.end();
   };
   JudgedResults judged;
+  judged.states = static_cast<std::int64_t>(expected.size());
   for (const auto& state : expected) {
     Sheet sheet(info, reference.stem().string() + state);
     const State theirs(oracle, state);
     if (has(found, state)) {
       judge_state(theirs, State(port, state), sheet);
     } else {
+      judged.missing_states.push_back(state.empty() ? "/" : state);
       for (const auto& field : theirs.names) sheet.row("fields", field, "").reason = not_given;
     }
     judged.add(sheet.take());

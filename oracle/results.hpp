@@ -8,6 +8,7 @@
 #include "oracle/field_checks.hpp"
 #include "oracle/matching.hpp"
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -21,6 +22,8 @@ inline constexpr std::int64_t results_schema = 1;
 /// was not asked about, so it makes no verdict better or worse.
 struct JudgedResults {
   std::vector<CheckRow> given, absent;
+  std::int64_t states = 1;                  // of the reference
+  std::vector<std::string> missing_states;  // of them, in the results
 
   void add(std::vector<CheckRow> rows);
 };

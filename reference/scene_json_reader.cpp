@@ -196,14 +196,17 @@ std::string JsonValue::text() const {
 }
 
 std::string JsonValue::name() const {
-  const std::string bound = "a name of 1 to 64 letters, digits, '.', '-' or '_'";
+  // It becomes part of paths: "." is the group itself to HDF5, and "-x" an option to programs.
+  const std::string bound =
+      "a name of 1 to 64 letters, digits, '.', '-' or '_', the first no '.' and no '-'";
   if (!json_->is_string()) refuse(bound);
   const auto value = json_->get<std::string>();
   const bool plain = std::all_of(value.begin(), value.end(), [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
            c == '-' || c == '_';
   });
-  if (value.empty() || value.size() > 64 || !plain) refuse(bound);
+  if (value.empty() || value.size() > 64 || !plain || value[0] == '.' || value[0] == '-')
+    refuse(bound);
   return value;
 }
 

@@ -323,6 +323,26 @@ TEST_F(Series, IsLookedAtAsOurOwnListsAre) {
     }
   }
   EXPECT_EQ(result.rows.front().first_miss, 1);
+  // Nobody knows what to expect of it, and nothing is not 0.
+  EXPECT_TRUE(std::isnan(result.rows.front().expected.missed_share));
+  EXPECT_TRUE(std::isnan(result.rows.front().expected.density_rms));
+  EXPECT_TRUE(std::isnan(result.rows.front().expected.acceleration_rms));
+}
+
+TEST_F(Series, ThatHasEachPairOnceIsRecognised) {
+  write_states({0});
+  Neighbors half = instants_[0].near;
+  std::size_t pairs = 0;
+  for (std::size_t i = 0; i < half.fluid.size(); ++i) {
+    std::erase_if(half.fluid[i], [&](std::int32_t j) { return j < static_cast<std::int32_t>(i); });
+    pairs += half.fluid[i].size();
+  }
+  ASSERT_GT(pairs, 10u);
+  write_list(0, 0, half);
+  const std::string said = complaint();
+  EXPECT_NE(said.find("/list/0/fluid = " + std::to_string(pairs) + " pairs"), std::string::npos)
+      << said;
+  EXPECT_NE(said.find("half list"), std::string::npos) << said;
 }
 
 TEST_F(Series, WithABrokenListIsRefusedNamingTheEntry) {

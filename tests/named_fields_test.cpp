@@ -175,6 +175,63 @@ TEST_F(NamedFields, MayHaveSeveralStatesAndVectors) {
   EXPECT_EQ(judged().report.rows[1].n, 15);
 }
 
+TEST_F(NamedFields, OfStatesThatAreMissingAreNamedAndCounted) {
+  reference([&](Hdf5Writer& out) {
+    for (const char* state : {"/early", "/middle", "/late"}) {
+      out.vector(std::string(state) + "/fields/x", x_, "");
+      out.attribute(std::string(state) + "/fields/x", "tolerance", 0.1);
+    }
+  });
+  port([&](Hdf5Writer& out) { out.vector("/middle/fields/x", x_, ""); });
+  const ResultsOutcome outcome = judged();
+  EXPECT_NE(outcome.line.find("2 of 3 states missing: /early, /late"), std::string::npos)
+      << outcome.line;
+  EXPECT_NE(outcome.table.find(outcome.line), std::string::npos);
+  port([&](Hdf5Writer& out) {
+    for (const char* state : {"/early", "/middle", "/late"})
+      out.vector(std::string(state) + "/fields/x", x_, "");
+  });
+  EXPECT_EQ(judged().line.find("missing"), std::string::npos);
+}
+
+/// Squares of these are beyond all numbers, or nothing.
+TEST_F(NamedFields, MayBeOfAnySize) {
+  x_ << 1e300, 1e-300, 0, 5;
+  reference([&](Hdf5Writer& out) {
+    out.vector("/fields/x", x_, "");
+    out.attribute("/fields/x", "relative", 1e-6);
+  });
+  EXPECT_EQ(status_off_by(0), 0);
+  // RMS = 1e300/√4.
+  const double tau = 1e-6 * 1e300 / 2;
+  EXPECT_NEAR(row_of(judged(), "fields", "x").tolerance / tau, 1, 1e-12);
+  EXPECT_EQ(status_off_by(0.99 * tau), 0);
+  EXPECT_EQ(status_off_by(1.01 * tau), 1);
+  x_ << 1e-300, 0, 0, 0;
+  reference([&](Hdf5Writer& out) {
+    out.vector("/fields/x", x_, "");
+    out.attribute("/fields/x", "relative", 1.0);
+  });
+  EXPECT_EQ(status_off_by(0.9 * 1e-300 / 2), 0);
+  EXPECT_EQ(status_off_by(1.1 * 1e-300 / 2), 1);
+}
+
+TEST_F(NamedFields, WithAToleranceBeyondAllNumbersAreRefused) {
+  x_ << 1e308, 1, 2, 3;
+  reference([&](Hdf5Writer& out) {
+    out.vector("/fields/x", x_, "");
+    out.attribute("/fields/x", "relative", 10.0);
+  });
+  port([&](Hdf5Writer& out) { out.vector("/fields/x", x_, ""); });
+  try {
+    (void)judged();
+    FAIL() << "must be refused";
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.key(), "/fields/x");
+    EXPECT_NE(error.value().find("a tolerance beyond"), std::string::npos) << error.value();
+  }
+}
+
 TEST_F(NamedFields, AreMatchedByIdInBothFiles) {
   IdVector ids(4), others(4);
   ids << 10, 30, 20, 40;

@@ -8,6 +8,7 @@
 #include "tools/build_provenance.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <filesystem>
 #include <memory>
@@ -89,6 +90,9 @@ ResultsOutcome judge_results_file(const ResultsRequest& request) {
   outcome.line = fmt::format("{}; {} rows given, {} not given and not_run",
                              verdict_line(rows == 0 ? Report{} : given), rows,
                              judged.absent.size());
+  if (!judged.missing_states.empty())
+    outcome.line += fmt::format("; {} of {} states missing: {}", judged.missing_states.size(),
+                                judged.states, fmt::join(judged.missing_states, ", "));
   outcome.table = table_of(given, judged.absent, outcome.line);
   outcome.report.rows = std::move(given.rows);
   for (CheckRow& row : judged.absent) outcome.report.rows.push_back(std::move(row));
