@@ -11,7 +11,9 @@
 #include <Eigen/Core>
 #include <nlohmann/json.hpp>
 
+#include <cstdlib>
 #include <memory>
+#include <string>
 
 namespace decant {
 namespace {
@@ -33,6 +35,12 @@ nlohmann::ordered_json executor_info(const char* name, Executor executor) {
   return info;
 }
 
+/// What OpenMP's threads do while they wait, as far as it is told.
+std::string wait_policy() {
+  const char* policy = std::getenv("OMP_WAIT_POLICY");
+  return policy ? policy : "not set";
+}
+
 nlohmann::ordered_json collect() {
   return {
       {"version", version},
@@ -41,6 +49,7 @@ nlohmann::ordered_json collect() {
       {"compiler", compiler},
       {"flags", flags},
       {"backends", backend_choices()},
+      {"omp_wait_policy", wait_policy()},
       {"executors", nlohmann::ordered_json::array({executor_info("host", Executor::host),
                                                    executor_info("cuda", Executor::cuda)})},
       {"libraries",
@@ -67,6 +76,7 @@ void print(const nlohmann::ordered_json& info) {
                executor.at("available").get<bool>()
                    ? executor.at("device").get<std::string>()
                    : "not available: " + executor.at("why_not").get<std::string>());
+  fmt::print("threads    OMP_WAIT_POLICY {}\n", text("omp_wait_policy"));
   std::string libraries;
   for (const auto& [name, number] : info.at("libraries").items())
     libraries +=

@@ -4,6 +4,7 @@
 #include "reference/error.hpp"
 #include "tools/backend_choice.hpp"
 #include "tools/commands.hpp"
+#include "tools/wait_policy.hpp"
 #include "version.hpp"
 
 #include <fmt/format.h>
@@ -35,6 +36,7 @@ int complain(int status, const char* what) {
 
 int main(int argc, char** argv) {
   using namespace decant;
+  let_waiting_threads_sleep(argv);
   int status = exit_pass;
   CLI::App app{"Judges GPU ports of an SPH fluid solver against a sequential oracle.", "decant"};
   app.set_version_flag("--version", std::string("decant ") + version);
