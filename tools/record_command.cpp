@@ -10,12 +10,14 @@
 #include "tools/build_provenance.hpp"
 #include "tools/checkpoint.hpp"
 #include "tools/commands.hpp"
+#include "tools/limits.hpp"
 #include "tools/output_place.hpp"
 #include "tools/phases.hpp"
 #include "tools/progress.hpp"
 #include "tools/recording.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <limits>
@@ -147,6 +149,23 @@ std::vector<Phase> phases_of(const RecordArguments& arguments, const Scene& scen
   return phases;
 }
 
+/// Where a state is beyond what the scene's time step and speed of sound were chosen for.
+/// \param density  N, kg/m³, the oracle's
+std::vector<std::string> beyond_limits(const Scene& scene, const ParticleState& state,
+                                       const Eigen::VectorXd& density) {
+  if (state.size() == 0) return {};
+  TimelineRow row;
+  Eigen::Index fastest = -1, densest = -1;
+  row.frame = state.substep / scene.schedule.substeps_per_frame;
+  row.max_speed = state.velocity.colwise().norm().maxCoeff(&fastest);
+  row.max_density = density.maxCoeff(&densest);
+  row.fastest_particle = fastest;
+  row.densest_particle = densest;
+  std::vector<std::string> all;
+  for (const LimitExceeded& e : limits_exceeded({row}, limits_of(scene))) all.push_back(describe(e));
+  return all;
+}
+
 void advance_to(std::int64_t target, std::int64_t& now, const Scene& scene, Backend& backend,
                 Progress& progress, const std::string& phase) {
   const std::int64_t per_frame = scene.schedule.substeps_per_frame;
@@ -189,6 +208,19 @@ int record(const RecordArguments& arguments) {
                start.state.size());
   std::fflush(stdout);
 
+  if (!arguments.quiet && !arguments.from.empty()) {
+    Fields fields;
+    ConditionSums ignored;
+    (void)evaluate_oracle(scene, start.state, fields, ignored);
+    for (const std::string& beyond : beyond_limits(scene, start.state, fields.density))
+      fmt::print(stderr, "warning: {}: {}\n", arguments.from, beyond);
+  }
+  if (const std::string revision = build_provenance().at("git_revision");
+      revision.ends_with("-dirty") && !arguments.quiet)
+    fmt::print(stderr,
+               "warning: this program is of revision {}, which nobody can get again; a fixture that is to "
+               "be kept wants a program built from what is committed\n",
+               revision);
   backend->load(scene, sample_walls(scene), start.state);
   std::int64_t now = start.state.substep;
   Progress progress("substep", phases.back().substep, now, arguments.quiet);
@@ -201,8 +233,10 @@ int record(const RecordArguments& arguments) {
     fixture.state.substep = now;
     const std::string weakness =
         record_answer(fixture, arguments.ensemble_substeps, arguments.ensemble_members);
+    const auto beyond = beyond_limits(scene, fixture.state, fixture.fields->density);
     if (arguments.sample) reduce_to_sample(fixture);
     fixture.provenance = provenance_of(arguments, info, start);
+    if (!beyond.empty()) fixture.provenance["limits_exceeded"] = fmt::format("{}", fmt::join(beyond, "; "));
     // Recorded anew from a fixture as it is: what brought the fluid there stays true.
     if (phase.substep == start.state.substep)
       for (const auto& [key, value] : start.provenance)
@@ -213,6 +247,8 @@ int record(const RecordArguments& arguments) {
     if (!arguments.quiet)
       fmt::print("{}: {} at {:.6g} s, substep {}, {} bytes\n", file, phase.name, scene.time_at(now),
                  now, std::filesystem::file_size(file));
+    if (!arguments.quiet)
+      for (const std::string& one : beyond) fmt::print(stderr, "warning: {}: {}\n", file, one);
     if (!weakness.empty()) fmt::print(stderr, "warning: {}: {}\n", file, weakness);
     std::fflush(stdout);
   }
