@@ -281,7 +281,7 @@ fault("infinite-is-a-number", "only what is no number at all is reported", "arra
       "fabsf(v.y) <= 3.0e38f && fabsf(v.z) <= 3.0e38f;", "status")
 fault("last-report-wins", "of two reports the later one stays", "arrays.cuh",
       "(static_cast<unsigned long long>(substep) << 32) |",
-      "(static_cast<unsigned long long>(ON ? 100 - substep : substep) << 32) |", "status", "brute")
+      "(static_cast<unsigned long long>(ON ? 100 - substep : substep) << 32) |", "status")
 
 # Integration and contact.
 fault("explicit-euler", "positions move by the old velocity", "passes.cuh",
@@ -306,7 +306,7 @@ fault("pulled-in", "contact pushes into the wall", "contact.cuh",
 fault("no-friction", "contact without friction", "contact.cuh", "1.0f - c.friction * impulse / slip",
       "1.0f", "substep", "brute")
 fault("friction", "friction wrong by 1e-3", "contact.cuh", "1.0f - c.friction * impulse / slip",
-      "1.0f - 1.001f * c.friction * impulse / slip", "contact", "brute")
+      "1.0f - 1.001f * c.friction * impulse / slip", "contact", "list")
 fault("restitution", "restitution wrong by 1e-3", "contact.cuh", "-(1.0f + c.restitution) * approach",
       "-(1.0f + 1.001f * c.restitution) * approach", "contact")
 fault("wall-velocity-before-the-push", "the wall's velocity where the particle was before the push",
@@ -326,7 +326,7 @@ fault("wall-velocity-in-contact", "contact with a wall that moves as if it did n
       "pose ? cross(pose->omega, x - pose->pivot)", "pose && !ON ? cross(pose->omega, x - pose->pivot)",
       "substep")
 fault("one-projection", "where two walls meet only one pushes", "contact.cuh",
-      "projection < 2", "projection < (ON ? 1 : 2)", "substep", fixture="pour-4k-settled")
+      "projection < 2", "projection < (ON ? 1 : 2)", "contact", fixture="pour-4k-settled")
 fault("contact-at-the-start", "walls push from where they stood before the substep", "contact.cuh",
       "const Float3 local = rotate_back(poses[k], x - poses[k].translation);",
       "const DevicePose& then = poses[ON ? k - g.containers : k];\n"
