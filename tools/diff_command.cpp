@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -144,6 +145,9 @@ int diff_reports(const DiffArguments& arguments) {
 
 /// What the two are is seen from what they hold.
 int diff(const DiffArguments& arguments) {
+  for (const std::string& path : {arguments.before, arguments.after})
+    if (std::error_code ignored; !std::filesystem::exists(path, ignored))
+      throw InputError(path, "file", "not found", "a report (*.h5) or a pour's folder");
   const bool before = is_pour(arguments.before), after = is_pour(arguments.after);
   if (before != after)
     throw InputError(before ? arguments.after : arguments.before, "kind", "no pour",
