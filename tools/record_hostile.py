@@ -39,6 +39,8 @@ def scene_of(fixtures, name):
 def to_world(container, time, x):
     """Points of a container's frame where they are at a time (s)."""
     x = x + np.array(container.get("origin", [0, 0, 0]))
+    if "translation" in container:
+        x = x + time * np.array(container["translation"]["velocity"])  # scenes here have no keys
     if "tilt" not in container:
         return x
     tilt = container["tilt"]
