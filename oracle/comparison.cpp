@@ -39,8 +39,9 @@ void compare(const Values& v, CheckRow& row) {
     const auto particle = static_cast<std::size_t>(k / v.components);
     if (v.excluded && (*v.excluded)[particle]) {
       if (k % v.components == 0) ++row.excluded;
+      // One whose own tolerance is wider than what is sane of others is held to that.
       if (std::isfinite(v.got[k]) && v.got[k] >= v.excluded_least &&
-          row.error[k] <= v.excluded_tolerance) {
+          (row.error[k] <= v.excluded_tolerance || row.error[k] <= v.tolerance[k])) {
         row.error[k] = 0;
         continue;
       }

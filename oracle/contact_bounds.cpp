@@ -19,12 +19,22 @@ bool turns(const Pose& pose) {
 }
 
 /// How far the normal turns when the point moves by up to `e` in any direction. Twice as far along each
-/// axis is farther than e along every direction, as 2 > √3.
-double turn_of_normal(const SolidDistance& solid, const Vec3& local, const Vec3& normal, double e) {
+/// axis is farther than e along every direction, as 2 > √3. A surface as near as e may show any of the
+/// normals around the point, an edge's whole fan of them: there it is asked in all 26 directions, near by
+/// and farther out.
+double turn_of_normal(const SolidDistance& solid, const Vec3& local, const SurfaceDistance& surface,
+                      double e) {
   double turn = 0;
+  const auto ask = [&](const Vec3& way) {
+    turn = std::max(turn, (solid.at(local + way).normal - surface.normal).norm());
+  };
   for (int a = 0; a < 3; ++a)
-    for (double side : {-2.0, 2.0})
-      turn = std::max(turn, (solid.at(local + side * e * Vec3::Unit(a)).normal - normal).norm());
+    for (double side : {-2.0, 2.0}) ask(side * e * Vec3::Unit(a));
+  if (std::abs(surface.distance) > 4 * e) return turn;
+  for (int k = 0; k < 27; ++k) {
+    const Vec3 way(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
+    for (double far : {0.25, 1.0, 2.0}) ask(far * e * way);
+  }
   return turn;
 }
 
@@ -38,7 +48,30 @@ bool BoundedParticle::touches(double distance, double reach, double e) {
 }
 
 ContactBounds::ContactBounds(const Scene& scene)
-    : scene_(scene), solids_(scene.containers.begin(), scene.containers.end()) {}
+    : scene_(scene), solids_(scene.containers.begin(), scene.containers.end()) {
+  for (const Container& c : scene.containers) {
+    const auto* revolved = std::get_if<RevolvedShape>(&c.shape);
+    edges_.push_back(revolved ? surface_edges(*revolved) : std::vector<ProfileEdge>{});
+    faces_.push_back(revolved ? std::vector<BoxFace>{} : exposed_faces(std::get<BoxShape>(c.shape)));
+  }
+}
+
+bool ContactBounds::near_seam(std::size_t container, const Vec3& place, double width) const {
+  const double r = std::hypot(place.x(), place.y());
+  for (const ProfileEdge& e : edges_[container])
+    if (std::hypot(r - e.r0, place.z() - e.z0) <= width || std::hypot(r - e.r1, place.z() - e.z1) <= width)
+      return true;
+  for (const BoxFace& f : faces_[container]) {
+    bool on_face = true, at_end = false;
+    for (int a = 0; a < 3; ++a) {
+      on_face = on_face && place[a] >= f.min[a] - width && place[a] <= f.max[a] + width;
+      at_end = at_end || (a != f.axis && (std::abs(place[a] - f.min[a]) <= width ||
+                                          std::abs(place[a] - f.max[a]) <= width));
+    }
+    if (on_face && at_end) return true;
+  }
+  return false;
+}
 
 std::vector<Pose> ContactBounds::poses_at(double time) const {
   std::vector<Pose> poses;
@@ -69,7 +102,7 @@ void ContactBounds::respond(double distance, const Vec3& normal, const Pose& pos
   const double reach = scene_.contact_distance(), way = std::max(0.0, reach - distance);
   const Vec3 v = p.v;
   // Also where the oracle's own distance is not within reach.
-  push_out(scene_, std::min(distance, std::nextafter(reach, 0.0)), normal, pose, p.x, p.v);
+  push_out(scene_, std::min(distance, std::nextafter(reach, -1.0)), normal, pose, p.x, p.v);
   p.pushed += way;
   p.tau_x = (p.tau_x.norm() + epsilon + way * (tau_n + 2 * u)) * Vec3::Ones() + 2 * u * p.x.cwiseAbs();
 
@@ -87,7 +120,8 @@ void ContactBounds::respond(double distance, const Vec3& normal, const Pose& pos
             Vec3::Ones();
 }
 
-void ContactBounds::contact(const SolidDistance& solid, const Pose& pose, BoundedParticle& p) const {
+void ContactBounds::contact(std::size_t container, const Pose& pose, BoundedParticle& p) const {
+  const SolidDistance& solid = solids_[container];
   const double reach = scene_.contact_distance();
   for (int projection = 0; projection < 2; ++projection) {
     const Vec3 local = pose.to_local(p.x);
@@ -99,9 +133,13 @@ void ContactBounds::contact(const SolidDistance& solid, const Pose& pose, Bounde
     if (!solid.may_be_within(reach + e, local)) return;
     const SurfaceDistance surface = solid.at(local);
     if (!p.touches(surface.distance, reach, e)) return;
-    double tau_n = turn_of_normal(solid, local, surface.normal, e) + 4 * u +
+    double tau_n = turn_of_normal(solid, local, surface, e) + 4 * u +
                    4 * u * local.norm() / std::abs(surface.distance);
     if (turns(pose)) tau_n += 8 * u;
+    const double tie = std::sqrt(6 * u);
+    if (near_seam(container, local - surface.distance * surface.normal,
+                  std::abs(surface.distance) * tie + 2 * e))
+      tau_n += tie;
     if (!(tau_n <= 0.1)) {
       p.ambiguous = true;
       tau_n = 2;
@@ -111,7 +149,7 @@ void ContactBounds::contact(const SolidDistance& solid, const Pose& pose, Bounde
 }
 
 void ContactBounds::collide(const std::vector<Pose>& poses, BoundedParticle& p) const {
-  for (std::size_t c = 0; c < solids_.size(); ++c) contact(solids_[c], poses[c], p);
+  for (std::size_t c = 0; c < solids_.size(); ++c) contact(c, poses[c], p);
   if (!scene_.floor) return;
   const double height = p.x.z() - scene_.floor->height;
   const double epsilon = 4 * u * (std::abs(p.x.z()) + std::abs(scene_.floor->height));

@@ -7,6 +7,7 @@
 #include "reference/distance.hpp"
 #include "reference/pose.hpp"
 #include "reference/scene.hpp"
+#include "reference/shapes.hpp"
 
 #include <vector>
 
@@ -52,6 +53,9 @@ void each_decision(Run run, Take take) {
 ///               container turns: what pose and distance add to the distance from a wall
 ///   tau_n     = how far the normal turns within |tau_x| + epsilon, and 4u (1 + |x_local|/|phi|), and 8u
 ///               where the container turns
+///   seam      = √(6u) more where the nearest point is within |phi| √(6u) + 2 (|tau_x| + epsilon) of the end
+///               of a face or edge: which of two is nearest is told by squares of distances, each rounded by
+///               3u, so that the nearest point of a neighbor so far along may be taken
 ///   tau_x    <- |tau_x| + epsilon + (phi_c − phi)(tau_n + 2u) + 2u|x|: the way out cancels the error
 ///               along the normal
 ///   tau_wall  = |omega| (|tau_x| + 4u (|x| + |pivot| + |x − pivot|)) + 3u (|v_linear| + |v_surface| +
@@ -77,13 +81,19 @@ class ContactBounds {
   const std::vector<SolidDistance>& solids() const { return solids_; }
 
  private:
-  void contact(const SolidDistance& solid, const Pose& pose, BoundedParticle& p) const;
+  void contact(std::size_t container, const Pose& pose, BoundedParticle& p) const;
   /// \param epsilon  m; \param tau_n  of the normal
   void respond(double distance, const Vec3& normal, const Pose& pose, double epsilon, double tau_n,
                BoundedParticle& p) const;
 
+  /// Whether a place of the container's surface (m, its frame) is within `width` (m) of where a face or an
+  /// edge of its outline ends.
+  bool near_seam(std::size_t container, const Vec3& place, double width) const;
+
   const Scene& scene_;
   std::vector<SolidDistance> solids_;
+  std::vector<std::vector<ProfileEdge>> edges_;  // of revolved containers
+  std::vector<std::vector<BoxFace>> faces_;      // of the others
 };
 
 }  // namespace decant
