@@ -97,6 +97,7 @@ class Bounds {
     C.density.setZero(n);
     C.density_pose.setZero(n);
     tau_q_.setZero(n);
+    in_common_q_.setZero(5, n);
     SumBound terms;
     for (Eigen::Index i = 0; i < n; ++i) {
       const Vec3 x_i = state_.position.col(i);
@@ -106,6 +107,7 @@ class Bounds {
       const double self = m * kernel_.W(0);
       terms.add(self);
       double sum = self, inside = own * self, by_H = -3 * self, pose = 0, misplaced = 0, from_volumes = 0;
+      Vec3 displaced = Vec3::Zero();  // what the walls being off alike along each axis adds, kg/m³
       for (const auto j : fluid) {
         const Vec3 x_j = state_.position.col(j), x_ij = separation_(x_i, x_j);
         const double r = x_ij.norm(), t = m * kernel_.W(r), slope = m * kernel_.slope_W(r);
@@ -125,7 +127,9 @@ class Bounds {
         inside += own_of_wall * t + of_distance * r * slope;
         by_H += r * slope - 3 * t;
         pose += slope * std::max(pose_.largest[b], image_magnitude(x_i, x_b, x_ib));
-        misplaced += slope * along(x_ib, r, wall_error(b, x_i, x_b, x_ib));
+        const Vec3 e = wall_error(b, x_i, x_b, x_ib);
+        misplaced += slope * along(x_ib, r, e);
+        if (r > 0) displaced += slope / r * x_ib.cwiseProduct(e);
         from_volumes += rho0 * answer_.tolerance.boundary_volume[b] * W;
       }
       // A pair that fp32 may place inside H has a term no larger than that of its nearest place.
@@ -137,12 +141,14 @@ class Bounds {
       C.density_pose[i] = pose;
       answer_.tolerance.density[i] =
           terms.error(u, u * (inside + std::abs(by_H)), cells_) + misplaced + from_volumes + from_edge;
-      pressure_bounds(i);
+      pressure_bounds(i, displaced, from_volumes);
     }
   }
 
   /// Pressure follows from the backend's own density unless density is given.
-  void pressure_bounds(Eigen::Index i) {
+  /// \param displaced  what density changes by where walls are off alike along each axis; \param from_volumes
+  /// where their volumes are too large alike, kg/m³
+  void pressure_bounds(Eigen::Index i, const Vec3& displaced, double from_volumes) {
     const FluidProperties& fluid = scene_.fluid;
     const double gamma = fluid.eos_exponent, B = scene_.eos_stiffness(), c0 = fluid.sound_speed;
     const double rho0 = fluid.rest_density;
@@ -161,6 +167,13 @@ class Bounds {
     if (p_given) tau_p = 0;
     tau_q_[i] = tau_p / (rho * rho) + 2 * std::abs(p) * tau_rho / (rho * rho * rho) +
                 4 * u * std::abs(p) / (rho * rho);
+    if (tau_p == 0 || rho_given) return;
+    // What is off alike for all particles shifts their q together: norm and mass, the walls' place (a rounded
+    // translation or pivot), their volumes.
+    const double slope = c0 * c0 * std::pow(compression, gamma - 1) / (rho * rho) -
+                         2 * p / (rho * rho * rho);
+    in_common_q_.col(i) << u * (common_.W + of_mass) * rho * slope, slope * displaced,
+        slope * from_volumes;
   }
 
   /// Error of x_i − x_b, by component, m.
@@ -220,6 +233,7 @@ class Bounds {
     const double m = scene_.particle_mass(), mu = scene_.fluid.viscosity;
     const double own = of_pressure_term, own_viscous = of_viscous_term;
     const Vec3 x_i = state_.position.col(i), v_i = state_.velocity.col(i);
+    Eigen::Matrix<double, 3, 5> in_common = Eigen::Matrix<double, 3, 5>::Zero();
     for (const auto j : ids) {
       const Vec3 x_j = state_.position.col(j), x_ij = separation_(x_i, x_j);
       const double r = x_ij.norm(), G = kernel_.G(r), dG = kernel_.slope_G(r);
@@ -233,6 +247,7 @@ class Bounds {
       pressure.pose += A * (G * e + dG * e_r * x);
       pressure.squares += (m * tau_q_[j] * G * x).cwiseAbs2();
       pressure.gradient += m * G * x_ij;
+      in_common += m * G * x_ij * (in_common_q_.col(i) + in_common_q_.col(j)).transpose();
       const Vec3 v_ji = state_.velocity.col(j) - v_i, dv = v_ji.cwiseAbs();
       const double D = mu / density_of(i) * m / density_of(j);
       const double L = kernel_.L(r), dL = kernel_.slope_L(r);
@@ -242,6 +257,7 @@ class Bounds {
       viscous.pose += D * dL * e_r * dv;
       viscous.inputs += D * L * (relative_density_error(i) + relative_density_error(j)) * dv;
     }
+    pressure.inputs += in_common.cwiseAbs().rowwise().sum();
     for (const Edge& e : edge_fluid_[static_cast<std::size_t>(i)]) {
       const Eigen::Index j = e.id;
       pressure.inputs += m * std::abs(q_of(i) + q_of(j)) * kernel_.G(e.r) *
@@ -359,6 +375,7 @@ class Bounds {
   PoseErrors pose_;
   CommonRoundings common_;
   Eigen::VectorXd tau_q_;
+  Eigen::Matrix<double, 5, Eigen::Dynamic> in_common_q_;  // how far all q shift together, by cause
   CellCounter cells_;
   Neighbors near_;
   /// A pair near H, and the least distance that fp32 may find.

@@ -191,7 +191,15 @@ class Oracle:
             return P, tau
         return np.maximum(P, 0), np.where(P + tau < 0, 0, tau)
 
-    def accelerations(self, rho, p, tau_rho, tau_p):
+    def in_common(self, rho, p, tau_p):
+        w, n, gamma = self.wall, len(rho), self.s["eos_exponent"]
+        slope = self.s["sound_speed"] ** 2 * (rho / self.rho0) ** (gamma - 1) / rho ** 2 - 2 * p / rho ** 3
+        steep = np.where(w.r > 0, self.rho0 * self.V[w.j] * self.dW(w.r) / np.where(w.r > 0, w.r, 1), 0)
+        volumes = total(n, w.i, self.rho0 * self.tau_V[w.j] * self.W(w.r))
+        shifts = [u * (self.k_W + 4) * rho, *total(n, w.i, steep[:, None] * w.x * w.e).T, volumes]
+        return [np.where(tau_p == 0, 0, s * slope) for s in shifts]
+
+    def accelerations(self, rho, p, tau_rho, tau_p, in_common=()):
         n, f, w, m, rho0, V = len(self.x), self.fluid, self.wall, self.m, self.rho0, self.V
         mu, mu_w = self.s["viscosity"], self.s["wall_viscosity"]
         q = p / rho ** 2
@@ -212,6 +220,8 @@ class Oracle:
              col(A * G) * f.e + col(A * dG * f.along) * x, 0 * x, self.k_G + 9)
         grad["pressure"] = total(n, f.i, col(m * G) * f.x)
         sq["pressure"] = total(n, f.i, (col(m * tau_q[f.j] * G) * x) ** 2)
+        for s in in_common:
+            rest["pressure"] += np.abs(total(n, f.i, col(m * (s[f.i] + s[f.j]) * G) * f.x))
         i, j, xn, r = f.near
         rest["pressure"] += total(n, i, col(m * np.abs(q[i] + q[j]) * self.G(r)) * np.abs(xn))
         dv, A = self.v[f.j] - self.v[f.i], mu / rho[f.i] * m / rho[f.j]
@@ -252,7 +262,8 @@ class Oracle:
         out = {("boundary_volume", "boundary_volume"): self.tau_V, ("density", "density"): self.tau_rho}
         p, tau_p = self.pressure(self.rho, self.tau_rho)
         out["pressure", "pressure"] = tau_p
-        for name, tau in self.accelerations(self.rho, p, self.tau_rho, tau_p).items():
+        for name, tau in self.accelerations(self.rho, p, self.tau_rho, tau_p,
+                                             self.in_common(self.rho, p, tau_p)).items():
             out["evaluation", name] = tau
         rho, p = self.staged
         out["equation_of_state", "pressure"] = self.pressure(rho, 0 * rho)[1]
