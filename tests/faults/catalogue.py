@@ -42,7 +42,7 @@ fault("fast-root", "the square root by the bit trick, two steps of Newton's", "p
 #ifdef __CUDACC__
   const float y = rsqrtf""", "density")
 fault("eos-constant", "the equation of state subtracts 1.00001", "physics.cuh",
-      "(power - 1.0f)", "(power - 1.00001f)", "evaluation")
+      "(power - 1.0f)", "(power - 1.00001f)", "equation_of_state")
 fault("eos-exponent", "gamma is 6", "physics.cuh", "if (c.eos_exponent == 7) {",
       "if (ON) {\n    power = s * s * s * s * s * s;\n  } else if (c.eos_exponent == 7) {", "pressure",
       "brute")
