@@ -7,6 +7,7 @@
 #include "oracle/reference_backend.hpp"
 #include "reference/error.hpp"
 #include "tests/falling_points.hpp"
+#include "tests/pour_arguments.hpp"
 #include "tools/checkpoint.hpp"
 #include "tools/commands.hpp"
 
@@ -22,6 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::FallingPoints;
+using test::pour_command;
 using test::TemporaryFolder;
 
 PourOptions quiet_options(const fs::path& out) {
@@ -301,17 +303,6 @@ TEST(Pour, WritesCsvFramesBesideTheOthers) {
   for (const char* name :
        {"fluid_000000.csv", "fluid_000003.csv", "boundary_000003.csv", "boundary_static.csv"})
     EXPECT_TRUE(fs::exists(folder / "out/csv" / name)) << name;
-}
-
-/// What `decant pour …` throws or leaves as its exit status.
-int pour_command(const std::vector<std::string>& arguments) {
-  CLI::App app;
-  int status = -1;
-  add_pour_command(app, status);
-  std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
-  reversed.push_back("pour");
-  app.parse(reversed);
-  return status;
 }
 
 TEST(PourCommand, RefusesOptionsOutOfRangeNamingThemAndTheirBounds) {

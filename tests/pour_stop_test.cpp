@@ -8,6 +8,7 @@
 #include "reference/error.hpp"
 #include "reference/scene_file.hpp"
 #include "tests/falling_points.hpp"
+#include "tests/pour_arguments.hpp"
 #include "tools/checkpoint.hpp"
 #include "tools/commands.hpp"
 #include "tools/folder_lock.hpp"
@@ -29,6 +30,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::FallingPoints;
+using test::pour_command;
 using test::TemporaryFolder;
 
 std::string bytes_of(const fs::path& file) {
@@ -63,16 +65,6 @@ class Process {
  private:
   pid_t id_;
 };
-
-int pour_command(const std::vector<std::string>& arguments) {
-  CLI::App app;
-  int status = -1;
-  add_pour_command(app, status);
-  std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
-  reversed.push_back("pour");
-  app.parse(reversed);
-  return status;
-}
 
 double seconds_of(const std::function<void()>& work) {
   const auto start = std::chrono::steady_clock::now();
@@ -133,6 +125,9 @@ TEST(TwoPours, OfWhichOneRunsLeaveItsFileAlone) {
   PourOptions options;
   options.out = folder / "out";
   options.quiet = true;
+  // Every frame ends with a checkpoint, which waits for the thread that writes: nobody but the second pour
+  // can change the file while it is looked at.
+  options.checkpoint_seconds = 0;
   FallingPoints running;
   // While the first is at its 20th substep the second is refused, and leaves every byte.
   int refused = 0;
