@@ -321,52 +321,41 @@ Eigen::Matrix3Xd Hdf5Reader::matrix3(const std::string& path, std::int64_t n) co
   return values;
 }
 
-Eigen::Matrix3Xd Hdf5Reader::matrix3_at(const std::string& path, std::int64_t index) const {
-  const Dataset data = open_dataset(*this, id_, path, H5T_FLOAT, 3, -1);
-  if (index < 0 || static_cast<hsize_t>(index) >= data.dims[0])
-    fail(path, describe(data.type.get(), data.dims), fmt::format("to hold entry {}", index));
-  Eigen::Matrix3Xd values(3, static_cast<Eigen::Index>(data.dims[1]));
-  const hsize_t start[3] = {static_cast<hsize_t>(index), 0, 0};
-  const hsize_t count[3] = {1, data.dims[1], 3};
-  const Handle memory(H5Screate_simple(3, count, nullptr));
-  H5Sselect_hyperslab(data.space.get(), H5S_SELECT_SET, start, nullptr, count, nullptr);
-  if (values.size() > 0 && H5Dread(data.id.get(), H5T_NATIVE_DOUBLE, memory.get(), data.space.get(),
-                                   H5P_DEFAULT, values.data()) < 0)
-    fail(path, hdf5_message(), "readable; the file is damaged");
-  return values;
-}
-
 namespace {
 
-/// Row `index` of a [T,n] dataset. \param memory_type  of `values`, which get n entries
-template <class Vector>
-void read_row(const Hdf5Reader& reader, const std::string& path, const Dataset& data,
-              std::int64_t index, hid_t memory_type, Vector& values) {
+/// Entry `index` of a [T,n] or [T,n,3] dataset, as columns of `values`.
+template <class Matrix>
+Matrix read_entry(const Hdf5Reader& reader, const std::string& path, const Dataset& data,
+                  std::int64_t index, hid_t memory_type, Matrix values) {
   if (index < 0 || static_cast<hsize_t>(index) >= data.dims[0])
     reader.fail(path, describe(data.type.get(), data.dims), fmt::format("to hold entry {}", index));
-  values.resize(static_cast<Eigen::Index>(data.dims[1]));
-  const hsize_t start[2] = {static_cast<hsize_t>(index), 0}, count[2] = {1, data.dims[1]};
-  const Handle memory(H5Screate_simple(2, count, nullptr));
+  const auto rank = static_cast<int>(data.dims.size());
+  values.resize(rank == 3 ? 3 : static_cast<Eigen::Index>(data.dims[1]),
+                rank == 3 ? static_cast<Eigen::Index>(data.dims[1]) : 1);
+  const hsize_t start[3] = {static_cast<hsize_t>(index), 0, 0}, count[3] = {1, data.dims[1], 3};
+  const Handle memory(H5Screate_simple(rank, count, nullptr));
   H5Sselect_hyperslab(data.space.get(), H5S_SELECT_SET, start, nullptr, count, nullptr);
   if (values.size() > 0 && H5Dread(data.id.get(), memory_type, memory.get(), data.space.get(),
                                    H5P_DEFAULT, values.data()) < 0)
     reader.fail(path, hdf5_message(), "readable; the file is damaged");
+  return values;
 }
 
 }  // namespace
 
+Eigen::Matrix3Xd Hdf5Reader::matrix3_at(const std::string& path, std::int64_t index) const {
+  return read_entry(*this, path, open_dataset(*this, id_, path, H5T_FLOAT, 3, -1), index,
+                    H5T_NATIVE_DOUBLE, Eigen::Matrix3Xd());
+}
+
 Eigen::VectorXd Hdf5Reader::vector_at(const std::string& path, std::int64_t index) const {
-  const Dataset data = open_dataset(*this, id_, path, H5T_FLOAT, 2, -1, false);
-  Eigen::VectorXd values;
-  read_row(*this, path, data, index, H5T_NATIVE_DOUBLE, values);
-  return values;
+  return read_entry(*this, path, open_dataset(*this, id_, path, H5T_FLOAT, 2, -1, false), index,
+                    H5T_NATIVE_DOUBLE, Eigen::VectorXd());
 }
 
 IdVector Hdf5Reader::integers_at(const std::string& path, std::int64_t index) const {
-  const Dataset data = open_dataset(*this, id_, path, H5T_INTEGER, 2, -1, false);
-  IdVector values;
-  read_row(*this, path, data, index, H5T_NATIVE_INT64, values);
-  return values;
+  return read_entry(*this, path, open_dataset(*this, id_, path, H5T_INTEGER, 2, -1, false), index,
+                    H5T_NATIVE_INT64, IdVector());
 }
 
 IdVector Hdf5Reader::integers(const std::string& path, std::int64_t n) const {
