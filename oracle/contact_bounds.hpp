@@ -79,6 +79,9 @@ class ContactBounds {
   /// \param time  s
   std::vector<Pose> poses_at(double time) const;
   const std::vector<SolidDistance>& solids() const { return solids_; }
+  /// Surface of a container, in its frame: edges of a revolved one's outline, faces of another one.
+  const std::vector<ProfileEdge>& edges(std::size_t container) const { return edges_[container]; }
+  const std::vector<BoxFace>& faces(std::size_t container) const { return faces_[container]; }
 
  private:
   void contact(std::size_t container, const Pose& pose, BoundedParticle& p) const;

@@ -38,13 +38,6 @@ class Draw {
   std::mt19937_64 random_{20240611};
 };
 
-/// Rounded to fp32. Volatile, because g++ 12 at -O3 leaves the casts to float and back of a Vec3 out.
-Vec3 in_fp32(const Vec3& x) {
-  volatile float rounded[3];
-  for (int a = 0; a < 3; ++a) rounded[a] = static_cast<float>(x[a]);
-  return {rounded[0], rounded[1], rounded[2]};
-}
-
 /// A place on a surface.
 struct Surface {
   Vec3 at, normal;  // m, container frame
@@ -86,8 +79,8 @@ class Probes {
   }
 
   void add(const Vec3& position, const Vec3& velocity) {
-    x_.push_back(in_fp32(position));
-    v_.push_back(in_fp32(velocity));
+    x_.push_back(position);
+    v_.push_back(velocity);
   }
 
   /// Those of the state that touch a wall one substep on.
@@ -113,21 +106,15 @@ class Probes {
   }
 
   void add_around_walls() {
-    std::vector<std::vector<ProfileEdge>> edges;
-    std::vector<std::vector<BoxFace>> faces;
     std::size_t places = scene_.floor ? 1 : 0;
-    for (const Container& c : scene_.containers) {
-      const auto* revolved = std::get_if<RevolvedShape>(&c.shape);
-      edges.push_back(revolved ? surface_edges(*revolved) : std::vector<ProfileEdge>{});
-      faces.push_back(revolved ? std::vector<BoxFace>{} : exposed_faces(std::get<BoxShape>(c.shape)));
-      places += edges.back().size() + faces.back().size();
-    }
+    for (std::size_t c = 0; c < scene_.containers.size(); ++c)
+      places += bounds_.edges(c).size() + bounds_.faces(c).size();
     if (places == 0) return;
     const int each = std::max(2, most_probes / static_cast<int>(places));
     for (std::size_t c = 0; c < scene_.containers.size(); ++c) {
-      for (const auto& e : edges[c])
+      for (const auto& e : bounds_.edges(c))
         for (int k = 0; k < each; ++k) add_at(c, on_edge(e, draw_));
-      for (const auto& f : faces[c])
+      for (const auto& f : bounds_.faces(c))
         for (int k = 0; k < each; ++k) add_at(c, on_face(f, draw_));
     }
     for (int k = 0; k < each && scene_.floor; ++k) {
@@ -139,33 +126,44 @@ class Probes {
   }
 
   ContactProblem take() {
-    ContactProblem problem{scene_, {}, {}, {}, {}};
-    std::vector<Vec3> x, v;
-    for (std::size_t i = 0; i < x_.size(); ++i) {
+    ContactProblem problem{scene_, drawn(), {}, {}, {}};
+    ParticleState& state = problem.state;
+    Eigen::Index n = 0;
+    for (Eigen::Index i = 0; i < state.size(); ++i) {
+      const Vec3 x = state.position.col(i), v = state.velocity.col(i);
       std::vector<SubstepOutcome> first, later;
-      bool stays = inside(scene_.domain, x_[i], scene_.particle_spacing);
-      const bool known = follow(i, 1, first, stays), known_later = follow(i, contact_run, later, stays);
+      bool stays = inside(scene_.domain, x, scene_.particle_spacing);
+      const bool known = follow(x, v, 1, first, stays),
+                 known_later = follow(x, v, contact_run, later, stays);
       if (!known || !stays) continue;
       if (known_later) {
-        problem.later_id.push_back(static_cast<Eigen::Index>(x.size()));
+        problem.later_id.push_back(n);
         problem.later.push_back(std::move(later));
       }
       problem.first.push_back(std::move(first));
-      x.push_back(x_[i]);
-      v.push_back(v_[i]);
+      state.position.col(n) = x;
+      state.velocity.col(n++) = v;
     }
-    const auto n = static_cast<Eigen::Index>(x.size());
-    problem.state.substep = substep_;
-    problem.state.position.resize(3, n);
-    problem.state.velocity.resize(3, n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      problem.state.position.col(i) = x[static_cast<std::size_t>(i)];
-      problem.state.velocity.col(i) = v[static_cast<std::size_t>(i)];
-    }
+    state.position.conservativeResize(3, n);
+    state.velocity.conservativeResize(3, n);
     return problem;
   }
 
  private:
+  /// All that were added, rounded to fp32 as every state is.
+  ParticleState drawn() const {
+    ParticleState state;
+    state.substep = substep_;
+    state.position.resize(3, static_cast<Eigen::Index>(x_.size()));
+    state.velocity.resize(3, static_cast<Eigen::Index>(v_.size()));
+    for (std::size_t i = 0; i < x_.size(); ++i) {
+      state.position.col(static_cast<Eigen::Index>(i)) = x_[i];
+      state.velocity.col(static_cast<Eigen::Index>(i)) = v_[i];
+    }
+    state.quantise();
+    return state;
+  }
+
   /// One that meets the surface of container c (its number: the floor), now or some substeps on.
   void add_at(std::size_t c, const Surface& surface) {
     static constexpr int when[] = {1, 1, 1, 1, 2, 4, 8};
@@ -196,10 +194,11 @@ class Probes {
 
   /// Outcomes so many substeps on; false where contacts cannot be told. One that leaves the domain does not
   /// stay.
-  bool follow(std::size_t i, int substeps, std::vector<SubstepOutcome>& outcomes, bool& stays) const {
+  bool follow(const Vec3& x, const Vec3& v, int substeps, std::vector<SubstepOutcome>& outcomes,
+              bool& stays) const {
     bool known = true;
     const auto run = [&](unsigned flips) {
-      BoundedParticle p{x_[i], v_[i], Vec3::Zero(), Vec3::Zero()};
+      BoundedParticle p{x, v, Vec3::Zero(), Vec3::Zero()};
       p.flips = flips;
       for (int k = 1; k <= substeps; ++k) {
         p.tau_v.array() += scene_.time_step() * force_free_acceleration;
