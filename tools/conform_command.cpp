@@ -13,7 +13,6 @@
 #include "tools/junit.hpp"
 #include "tools/output_place.hpp"
 #include "tools/progress.hpp"
-#include "tools/recording.hpp"
 #include "tools/replay.hpp"
 #include "tools/results_judgement.hpp"
 

@@ -37,16 +37,6 @@ std::vector<Recording> small_fixtures(const std::filesystem::path& folder) {
   return found;
 }
 
-std::vector<std::string> split(const std::string& list) {
-  std::vector<std::string> parts;
-  for (std::size_t at = 0; at < list.size();) {
-    const std::size_t end = std::min(list.find(',', at), list.size());
-    parts.push_back(list.substr(at, end - at));
-    at = end + 1;
-  }
-  return parts;
-}
-
 }  // namespace
 
 std::string judge_held_out(const nlohmann::json& faults, Executor executor, int jobs,
@@ -74,10 +64,12 @@ std::string judge_held_out(const nlohmann::json& faults, Executor executor, int 
     std::vector<std::size_t> which;
     for (std::size_t k = 0; k < planted.size(); ++k) {
       if (!by[k].empty()) continue;
-      for (const auto& backend : defaults.empty() ? split(planted[k].value("backend", "")) : defaults) {
+      const auto try_on = [&](const std::string& backend) {
         trials.push_back({number(planted[k]), backend, fixture});
         which.push_back(k);
-      }
+      };
+      for (const auto& backend : defaults) try_on(backend);
+      if (defaults.empty() && planted[k].contains("backend")) try_on(text(planted[k], "backend"));
     }
     const auto outcomes = run_all(trials, executor, jobs, prepared);
     for (std::size_t t = 0; t < trials.size(); ++t) {
