@@ -21,16 +21,6 @@ Nearest nearest_on(const ProfileEdge& e, double r, double z) {
   return {nr, nz, (r - nr) * (r - nr) + (z - nz) * (z - nz)};
 }
 
-/// Number of surface edges that a ray in +r from (r, z) meets.
-int crossings_outward(const std::vector<ProfileEdge>& edges, double r, double z) {
-  int count = 0;
-  for (const auto& e : edges) {
-    if ((e.z0 > z) == (e.z1 > z)) continue;
-    if (r < e.r0 + (z - e.z0) / (e.z1 - e.z0) * (e.r1 - e.r0)) ++count;
-  }
-  return count;
-}
-
 int crossings_below(const std::vector<ProfileEdge>& edges, double r, double z) {
   int count = 0;
   for (const auto& e : edges) {

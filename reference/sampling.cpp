@@ -63,7 +63,8 @@ std::vector<Point2> inset_points(const std::vector<ProfileEdge>& edges, double d
   }
   // A mitred corner can stand out of a thin solid, or come too near to another face.
   std::erase_if(points, [&](const Point2& p) {
-    return p.x() < 0 || distance_to_outline(edges, p) < 0.5 * dx * (1 - 1e-9);
+    return p.x() < 0 || crossings_outward(edges, p.x(), p.y()) % 2 == 0 ||
+           distance_to_outline(edges, p) < 0.5 * dx * (1 - 1e-9);
   });
   return points;
 }

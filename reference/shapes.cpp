@@ -40,6 +40,15 @@ bool in_solid(const std::vector<SolidBox>& solid, const Vec3& local) {
   });
 }
 
+int crossings_outward(const std::vector<ProfileEdge>& edges, double r, double z) {
+  int count = 0;
+  for (const auto& e : edges) {
+    if ((e.z0 > z) == (e.z1 > z)) continue;
+    if (r < e.r0 + (z - e.z0) / (e.z1 - e.z0) * (e.r1 - e.r0)) ++count;
+  }
+  return count;
+}
+
 std::vector<BoxFace> exposed_faces(const BoxShape& shape) {
   // Every coordinate at which a box begins or ends cuts space into cells that are solid or not;
   // the surface is where a solid cell meets one that is not.

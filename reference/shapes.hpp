@@ -38,6 +38,9 @@ struct ProfileEdge {
 /// The outline's edges in order, those on the axis left out.
 std::vector<ProfileEdge> surface_edges(const RevolvedShape& shape);
 
+/// Number of surface edges that a ray in +r from (r, z) meets, m; odd inside the solid.
+int crossings_outward(const std::vector<ProfileEdge>& edges, double r, double z);
+
 /// True inside or on the union.
 bool in_solid(const std::vector<SolidBox>& solid, const Vec3& local);
 

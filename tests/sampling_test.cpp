@@ -122,6 +122,24 @@ TEST(Walls, KeepASpacingFromTheFluidAndStayOutOfTheCavity) {
   }
 }
 
+/// A ring with an edge all around its hole, thinner than the layers asked for: insets of one face come out of
+/// the other.
+TEST(Walls, StayInsideASolidThatIsThinnerThanTheirLayers) {
+  Scene scene = cup_scene(0.06);
+  scene.wall_layers = 3;
+  for (const double thickness_in_dx : {1.2, 2.0, 2.6, 3.4, 5.0})
+    for (const double edge : {0.3, 0.6, 1.5}) {
+      const double dx = scene.particle_spacing, high = thickness_in_dx * dx;
+      Container& ring = scene.containers[0];
+      ring.shape = RevolvedShape{
+          {{1.2 * dx, 0}, {6 * dx, 0}, {6 * dx, high}, {1.5 * dx, high}, {edge * dx, 0.5 * high}}};
+      const Eigen::Matrix3Xd wall = sample_walls(scene).containers[0].position;
+      EXPECT_GT(wall.cols(), 0);
+      for (const auto& x : wall.colwise())
+        EXPECT_LT(signed_distance(ring, x).distance, -0.49 * dx) << thickness_in_dx << ' ' << edge << ": " << x.transpose();
+    }
+}
+
 TEST(Walls, AreTheSameNumbersInSinglePrecision) {
   const Eigen::Matrix3Xd x = sample_walls(cup_scene(0.06)).containers[0].position;
   EXPECT_EQ(x, x.cast<float>().cast<double>());
