@@ -42,7 +42,8 @@ PoseErrors pose_errors(const Scene& scene, const Walls& walls, const PosedWalls&
 ///
 ///   u H for each of the two with |x_c| < H: a frame relative to the center of a cell, up to 2 H wide and a
 ///     power of two, is exact but in the cells at 0, whose places have finer grids than what is left of them;
-///   u (3 |k L| + |x_i,c|) where the nearest image is k ≠ 0 periods away: L is rounded, or x_j moved by it.
+///   u (3 |k L| + |x_i,c| + |x_ij,c|) where the nearest image is k ≠ 0 periods away: L is rounded, or x_j moved
+///     by it.
 ///
 /// \param x_ij  by the nearest image; \param H  support radius, m
 inline Vec3 pair_error(const Vec3& x_i, const Vec3& x_j, const Vec3& x_ij, double H, double u) {
@@ -51,7 +52,7 @@ inline Vec3 pair_error(const Vec3& x_i, const Vec3& x_j, const Vec3& x_ij, doubl
     e[c] = u * H * ((std::abs(x_i[c]) < H ? 1 : 0) + (std::abs(x_j[c]) < H ? 1 : 0));
     const double periods = std::abs(x_i[c] - x_j[c] - x_ij[c]);
     // Without a period the difference is the same bit for bit.
-    if (periods > 0) e[c] += u * (3 * periods + std::abs(x_i[c]));
+    if (periods > 0) e[c] += u * (3 * periods + std::abs(x_i[c]) + std::abs(x_ij[c]));
   }
   return e;
 }

@@ -61,20 +61,22 @@ class Bounds {
         state_(state),
         given_(given),
         H_(scene.support_radius()),
+        periodic_(scene.domain.periodic[0] || scene.domain.periodic[1] || scene.domain.periodic[2]),
         kernel_(scene.kernel, H_),
         separation_(scene.domain),
         posed_(pose_walls(scene, walls, scene.time_at(state.substep))),
         pose_(pose_errors(scene, walls, posed_, scene.time_at(state.substep), u)),
         common_(scene.kernel) {
     OracleAnswer& a = answer_;
-    find_neighbors(scene, state.position, posed_.position, NeighborSearch::cells, near_);
+    Neighbors near_H;
+    find_neighbors_and_shell(scene, state.position, posed_.position, widest_margin(), near_, near_H);
     evaluate<double>(scene, state, posed_, volumes.volume, near_, a.fields, given);
     a.tolerance = Fields::unwritten(state.size(), walls.size());
     for (auto* facts : {&a.tolerance.fluid_neighbor_count, &a.tolerance.fluid_neighbor_id_sum,
                         &a.tolerance.wall_neighbor_count, &a.tolerance.wall_neighbor_id_sum})
       facts->setZero();
     a.tolerance.boundary_volume = volumes.tolerance;
-    ambiguous_pairs();
+    ambiguous_pairs(near_H);
     density_and_pressure();
     accelerations();
   }
@@ -82,6 +84,13 @@ class Bounds {
   OracleAnswer take() { return std::move(answer_); }
 
  private:
+  /// By axis, of images with x_ij > 0 and with x_ij < 0.
+  using Sides = Eigen::Matrix<double, 3, 2>;
+  /// \param straight  x_i − x_j; \param x_ij  by the nearest image, m; \param per_length  Σ's term by |x_ij|
+  static void add_images(const Vec3& straight, const Vec3& x_ij, const Vec3& per_length, Sides& to) {
+    for (int a = 0; a < 3; ++a)
+      if (straight[a] != x_ij[a]) to(a, x_ij[a] > 0 ? 0 : 1) += std::abs(x_ij[a]) * per_length[a];
+  }
   /// Extra magnitude that a pair across a periodic boundary passes through, m.
   double image_magnitude(const Vec3& x_i, const Vec3& x_j, const Vec3& x_ij) const {
     return (x_i - x_j - x_ij).cwiseAbs().maxCoeff();
@@ -97,8 +106,10 @@ class Bounds {
     C.density.setZero(n);
     C.density_pose.setZero(n);
     tau_q_.setZero(n);
-    in_common_q_.setZero(5, n);
+    in_common_q_.setZero(periodic_ ? 11 : 5, n);
     SumBound terms;
+    // A shell of half-width d about H holds 6 d/H of the pairs inside H where the fluid is uniform.
+    double ambiguous_fluid = 0, ambiguous_wall = 0;
     for (Eigen::Index i = 0; i < n; ++i) {
       const Vec3 x_i = state_.position.col(i);
       const auto& fluid = near_.fluid[static_cast<std::size_t>(i)];
@@ -108,6 +119,7 @@ class Bounds {
       terms.add(self);
       double sum = self, inside = own * self, by_H = -3 * self, pose = 0, misplaced = 0, from_volumes = 0;
       Vec3 displaced = Vec3::Zero();  // what the walls being off alike along each axis adds, kg/m³
+      Sides images = Sides::Zero();   // and the images on each side
       for (const auto j : fluid) {
         const Vec3 x_j = state_.position.col(j), x_ij = separation_(x_i, x_j);
         const double r = x_ij.norm(), t = m * kernel_.W(r), slope = m * kernel_.slope_W(r);
@@ -116,7 +128,10 @@ class Bounds {
         inside += own * t + of_distance * r * slope;
         by_H += r * slope - 3 * t;
         pose += slope * image_magnitude(x_i, x_j, x_ij);
-        misplaced += slope * along(x_ij, r, pair_error(x_i, x_j, x_ij, H_, u));
+        const Vec3 e = pair_error(x_i, x_j, x_ij, H_, u);
+        misplaced += slope * along(x_ij, r, e);
+        if (periodic_ && r > 0) add_images(x_i - x_j, x_ij, slope / r * e, images);
+        ambiguous_fluid += 6 * margin(e) / H_;
       }
       for (const auto b : wall) {
         const Vec3 x_b = posed_.position.col(b), x_ib = separation_(x_i, x_b);
@@ -129,7 +144,9 @@ class Bounds {
         pose += slope * std::max(pose_.largest[b], image_magnitude(x_i, x_b, x_ib));
         const Vec3 e = wall_error(b, x_i, x_b, x_ib);
         misplaced += slope * along(x_ib, r, e);
+        ambiguous_wall += 6 * margin(e) / H_;
         if (r > 0) displaced += slope / r * x_ib.cwiseProduct(e);
+        if (periodic_ && r > 0) add_images(x_i - x_b, x_ib, slope / r * e, images);
         from_volumes += rho0 * answer_.tolerance.boundary_volume[b] * W;
       }
       // A pair that fp32 may place inside H has a term no larger than that of its nearest place.
@@ -141,14 +158,16 @@ class Bounds {
       C.density_pose[i] = pose;
       answer_.tolerance.density[i] =
           terms.error(u, u * (inside + std::abs(by_H)), cells_) + misplaced + from_volumes + from_edge;
-      pressure_bounds(i, displaced, from_volumes);
+      pressure_bounds(i, displaced, from_volumes, images);
     }
+    answer_.most_fluid_ambiguous = static_cast<std::int64_t>(std::ceil(4 * ambiguous_fluid)) + 10;
+    answer_.most_wall_ambiguous = static_cast<std::int64_t>(std::ceil(4 * ambiguous_wall)) + 10;
   }
 
   /// Pressure follows from the backend's own density unless density is given.
   /// \param displaced  what density changes by where walls are off alike along each axis; \param from_volumes
-  /// where their volumes are too large alike, kg/m³
-  void pressure_bounds(Eigen::Index i, const Vec3& displaced, double from_volumes) {
+  /// where their volumes are too large alike; \param images  where images are off alike, by axis and side, kg/m³
+  void pressure_bounds(Eigen::Index i, const Vec3& displaced, double from_volumes, const Sides& images) {
     const FluidProperties& fluid = scene_.fluid;
     const double gamma = fluid.eos_exponent, B = scene_.eos_stiffness(), c0 = fluid.sound_speed;
     const double rho0 = fluid.rest_density;
@@ -169,11 +188,12 @@ class Bounds {
                 4 * u * std::abs(p) / (rho * rho);
     if (tau_p == 0 || rho_given) return;
     // What is off alike for all particles shifts their q together: norm and mass, the walls' place (a rounded
-    // translation or pivot), their volumes.
+    // translation or pivot), their volumes, images by a rounded period.
     const double slope = c0 * c0 * std::pow(compression, gamma - 1) / (rho * rho) -
                          2 * p / (rho * rho * rho);
-    in_common_q_.col(i) << u * (common_.W + of_mass) * rho * slope, slope * displaced,
+    in_common_q_.col(i).head<5>() << u * (common_.W + of_mass) * rho * slope, slope * displaced,
         slope * from_volumes;
+    if (periodic_) in_common_q_.col(i).tail<6>() = slope * images.reshaped();
   }
 
   /// Error of x_i − x_b, by component, m.
@@ -188,6 +208,12 @@ class Bounds {
     for (auto* sum : {&C.pressure_acceleration, &C.viscous_acceleration,
                       &C.wall_pressure_acceleration, &C.wall_viscous_acceleration})
       sum->setZero(3, n);
+    rho_ = given_ && given_->density.size() ? given_->density : answer_.fields.density;
+    q_ = (given_ && given_->pressure.size() ? given_->pressure : answer_.fields.pressure).array() /
+         rho_.array().square();
+    rho_off_.setZero(n);
+    if (!(given_ && given_->density.size()))
+      rho_off_ = answer_.tolerance.density.array() / answer_.fields.density.array();
     ForceBounds pressure, viscous, wall_pressure, wall_viscous;
     for (Eigen::Index i = 0; i < n; ++i) {
       for (ForceBounds* part : {&pressure, &viscous, &wall_pressure, &wall_viscous}) part->clear();
@@ -214,55 +240,45 @@ class Bounds {
     }
   }
 
-  double density_of(Eigen::Index i) const {
-    return given_ && given_->density.size() ? given_->density[i] : answer_.fields.density[i];
-  }
-  double relative_density_error(Eigen::Index i) const {
-    return given_ && given_->density.size()
-               ? 0.0
-               : answer_.tolerance.density[i] / answer_.fields.density[i];
-  }
-  double q_of(Eigen::Index i) const {
-    const double p =
-        given_ && given_->pressure.size() ? given_->pressure[i] : answer_.fields.pressure[i];
-    return p / (density_of(i) * density_of(i));
-  }
-
   void fluid_bounds(Eigen::Index i, const std::vector<std::int32_t>& ids, ForceBounds& pressure,
                     ForceBounds& viscous) const {
     const double m = scene_.particle_mass(), mu = scene_.fluid.viscosity;
     const double own = of_pressure_term, own_viscous = of_viscous_term;
     const Vec3 x_i = state_.position.col(i), v_i = state_.velocity.col(i);
+    const double q_i = q_[i], of_i = mu / rho_[i] * m;
     Eigen::Matrix<double, 3, 5> in_common = Eigen::Matrix<double, 3, 5>::Zero();
+    Eigen::Matrix<double, 3, 6> by_images = Eigen::Matrix<double, 3, 6>::Zero();
     for (const auto j : ids) {
       const Vec3 x_j = state_.position.col(j), x_ij = separation_(x_i, x_j);
       const double r = x_ij.norm(), G = kernel_.G(r), dG = kernel_.slope_G(r);
       const Vec3 x = x_ij.cwiseAbs();
-      const double A = m * (std::abs(q_of(i)) + std::abs(q_of(j)));
+      const double q_j = q_[j], A = m * (std::abs(q_i) + std::abs(q_j));
       const Vec3 e = pair_error(x_i, x_j, x_ij, H_, u);
       const double e_r = along(x_ij, r, e);
-      pressure.add(m * (q_of(i) + q_of(j)) * G * x_ij);
-      pressure.condition += m * std::abs(q_of(i) + q_of(j)) * (G + r * dG) * x;
+      pressure.add(m * (q_i + q_j) * G * x_ij);
+      pressure.condition += m * std::abs(q_i + q_j) * (G + r * dG) * x;
       pressure.inside += A * (own * G + of_distance_and_H * r * dG) * x;
       pressure.pose += A * (G * e + dG * e_r * x);
       pressure.squares += (m * tau_q_[j] * G * x).cwiseAbs2();
       pressure.gradient += m * G * x_ij;
-      in_common += m * G * x_ij * (in_common_q_.col(i) + in_common_q_.col(j)).transpose();
+      in_common += m * G * x_ij * (in_common_q_.col(i).head<5>() + in_common_q_.col(j).head<5>()).transpose();
+      if (periodic_)
+        by_images += m * G * x_ij * (in_common_q_.col(i).tail<6>() + in_common_q_.col(j).tail<6>()).transpose();
       const Vec3 v_ji = state_.velocity.col(j) - v_i, dv = v_ji.cwiseAbs();
-      const double D = mu / density_of(i) * m / density_of(j);
+      const double D = of_i / rho_[j];
       const double L = kernel_.L(r), dL = kernel_.slope_L(r);
       viscous.add(D * L * v_ji);
       viscous.condition += D * (L + r * dL) * dv;
       viscous.inside += D * (own_viscous * L + of_distance_and_H * r * dL) * dv;
       viscous.pose += D * dL * e_r * dv;
-      viscous.inputs += D * L * (relative_density_error(i) + relative_density_error(j)) * dv;
+      viscous.inputs += D * L * (rho_off_[i] + rho_off_[j]) * dv;
     }
-    pressure.inputs += in_common.cwiseAbs().rowwise().sum();
+    pressure.inputs += in_common.cwiseAbs().rowwise().sum() + by_images.cwiseAbs().rowwise().sum();
     for (const Edge& e : edge_fluid_[static_cast<std::size_t>(i)]) {
       const Eigen::Index j = e.id;
-      pressure.inputs += m * std::abs(q_of(i) + q_of(j)) * kernel_.G(e.r) *
+      pressure.inputs += m * std::abs(q_i + q_[j]) * kernel_.G(e.r) *
                          separation_(x_i, Vec3(state_.position.col(j))).cwiseAbs();
-      viscous.inputs += mu / density_of(i) * m / density_of(j) * kernel_.L(e.r) *
+      viscous.inputs += of_i / rho_[j] * kernel_.L(e.r) *
                         (state_.velocity.col(j) - v_i).cwiseAbs();
     }
   }
@@ -281,25 +297,25 @@ class Bounds {
       const Vec3 e = wall_error(b, x_i, x_b, x_ib);
       const double e_r = along(x_ib, r, e);
       const double tau_V = answer_.tolerance.boundary_volume[b];
-      const double A = rho0 * V[b] * std::abs(q_of(i));
-      pressure.add(rho0 * V[b] * q_of(i) * G * x_ib);
+      const double A = rho0 * V[b] * std::abs(q_[i]);
+      pressure.add(rho0 * V[b] * q_[i] * G * x_ib);
       pressure.condition += A * (G + r * dG) * x;
       pressure.inside += A * (own * G + of_distance_and_H * r * dG) * x;
       pressure.pose += A * (G * e + dG * e_r * x);
       pressure.inputs += A / V[b] * tau_V * G * x;
       pressure.gradient += rho0 * V[b] * G * x_ib;
       const Vec3 v_bi = posed_.velocity.col(b) - v_i, dv = v_bi.cwiseAbs();
-      const double D = mu_w / density_of(i) * V[b], L = kernel_.L(r), dL = kernel_.slope_L(r);
+      const double D = mu_w / rho_[i] * V[b], L = kernel_.L(r), dL = kernel_.slope_L(r);
       viscous.add(D * L * v_bi);
       viscous.condition += D * (L + r * dL) * dv;
       viscous.inside += D * (own_viscous * L + of_distance_and_H * r * dL) * dv;
       viscous.pose += D * (dL * e_r * dv + L * pose_.velocity.col(b));
-      viscous.inputs += D * L * (relative_density_error(i) + tau_V / V[b]) * dv;
+      viscous.inputs += D * L * (rho_off_[i] + tau_V / V[b]) * dv;
     }
     for (const Edge& e : edge_wall_[static_cast<std::size_t>(i)]) {
-      pressure.inputs += rho0 * V[e.id] * std::abs(q_of(i)) * kernel_.G(e.r) *
+      pressure.inputs += rho0 * V[e.id] * std::abs(q_[i]) * kernel_.G(e.r) *
                          separation_(x_i, Vec3(posed_.position.col(e.id))).cwiseAbs();
-      viscous.inputs += mu_w / density_of(i) * V[e.id] * kernel_.L(e.r) *
+      viscous.inputs += mu_w / rho_[i] * V[e.id] * kernel_.L(e.r) *
                         (posed_.velocity.col(e.id) - v_i).cwiseAbs();
     }
   }
@@ -310,72 +326,63 @@ class Bounds {
     const double H = scene_.support_radius(), grid = std::exp2(std::floor(std::log2(H)) - 10);
     const auto whole = [&](double x) { return std::remainder(x, grid) == 0; };
     const auto& x = state_.position;
-    return whole(H) && !(scene_.domain.periodic[0] || scene_.domain.periodic[1] ||
-                         scene_.domain.periodic[2]) &&
-           std::all_of(x.data(), x.data() + x.size(), whole);
+    return whole(H) && !periodic_ && std::all_of(x.data(), x.data() + x.size(), whole);
   }
+
+  /// What no pair's margin exceeds, m.
+  double widest_margin() const {
+    double widest = 12 * u * H_;
+    if (pose_.position.size()) widest += pose_.position.colwise().norm().maxCoeff();
+    const Domain& domain = scene_.domain;
+    if (periodic_)
+      widest += 3 * u * (3 * (domain.max - domain.min).maxCoeff() +
+                         domain.min.cwiseAbs().cwiseMax(domain.max.cwiseAbs()).maxCoeff());
+    return widest;
+  }
+  /// How far fp32's distance may be from the pair's, m. \param e  error of its separation
+  double margin(const Vec3& e) const { return 8 * u * H_ + e.norm(); }
 
   /// Pairs whose distance fp32 may find on the other side of H: within 8 u H and what their places are
   /// off. Those beyond H have no term in the oracle's sums, but may have one in fp32; those inside may have
   /// none, or one that their own, near zero of an order above one, says nothing about.
-  void ambiguous_pairs() {
-    const double H = scene_.support_radius();
-    const Domain& domain = scene_.domain;
-    double widest = 12 * u * H;
-    if (pose_.position.size()) widest += pose_.position.colwise().norm().maxCoeff();
-    if (domain.periodic[0] || domain.periodic[1] || domain.periodic[2])
-      widest += 3 * u * (3 * (domain.max - domain.min).maxCoeff() +
-                         domain.min.cwiseAbs().cwiseMax(domain.max.cwiseAbs()).maxCoeff());
-    Scene wider = scene_;
-    wider.support_ratio = (H + widest) / scene_.particle_spacing;
-    Neighbors near;
-    find_neighbors(wider, state_.position, posed_.position, NeighborSearch::cells, near);
+  void ambiguous_pairs(const Neighbors& near_H) {
     const auto n = static_cast<std::size_t>(state_.size());
     edge_fluid_.resize(n);
     edge_wall_.resize(n);
     answer_.fluid_ambiguous.assign(n, false);
     answer_.wall_ambiguous.assign(n, false);
-    // A shell of half-width d about H holds 6 d/H of the pairs inside H where the fluid is uniform.
-    double expected_fluid = 0, expected_wall = 0;
     const bool exact = exact_distances();
     for (std::size_t i = 0; i < n; ++i) {
       const Vec3 x_i = state_.position.col(static_cast<Eigen::Index>(i));
-      for (const auto j : near.fluid[i]) {
+      for (const auto j : near_H.fluid[i]) {
         const Vec3 x_j = state_.position.col(j), x_ij = separation_(x_i, x_j);
-        const double margin = 8 * u * H + pair_error(x_i, x_j, x_ij, H_, u).norm();
-        const double r = x_ij.norm();
-        if (!exact && std::abs(r - H) <= margin) {
-          answer_.fluid_ambiguous[i] = true;
-          edge_fluid_[i].push_back({j, std::min(r, H) - margin});
-        }
-        expected_fluid += 6 * margin / H;
+        const double r = x_ij.norm(), off = margin(pair_error(x_i, x_j, x_ij, H_, u));
+        if (exact || std::abs(r - H_) > off) continue;
+        answer_.fluid_ambiguous[i] = true;
+        edge_fluid_[i].push_back({j, std::min(r, H_) - off});
       }
-      for (const auto b : near.wall[i]) {
+      for (const auto b : near_H.wall[i]) {
         const Vec3 x_b = posed_.position.col(b), x_ib = separation_(x_i, x_b);
-        const double margin = 8 * u * H + wall_error(b, x_i, x_b, x_ib).norm();
-        const double r = x_ib.norm();
-        if (std::abs(r - H) <= margin) {
-          answer_.wall_ambiguous[i] = true;
-          edge_wall_[i].push_back({b, std::min(r, H) - margin});
-        }
-        expected_wall += 6 * margin / H;
+        const double r = x_ib.norm(), off = margin(wall_error(b, x_i, x_b, x_ib));
+        if (std::abs(r - H_) > off) continue;
+        answer_.wall_ambiguous[i] = true;
+        edge_wall_[i].push_back({b, std::min(r, H_) - off});
       }
     }
-    answer_.most_fluid_ambiguous = static_cast<std::int64_t>(std::ceil(4 * expected_fluid)) + 10;
-    answer_.most_wall_ambiguous = static_cast<std::int64_t>(std::ceil(4 * expected_wall)) + 10;
   }
 
   const Scene& scene_;
   const ParticleState& state_;
   const StageInputs* given_;
   double H_;
+  bool periodic_;
   Kernel<double> kernel_;
   Separation separation_;
   PosedWalls posed_;
   PoseErrors pose_;
   CommonRoundings common_;
-  Eigen::VectorXd tau_q_;
-  Eigen::Matrix<double, 5, Eigen::Dynamic> in_common_q_;  // how far all q shift together, by cause
+  Eigen::VectorXd rho_, rho_off_, q_, tau_q_;  // rho_off: tau_rho / rho
+  Eigen::MatrixXd in_common_q_;  // how far all q shift together, by cause, the last six on periodic axes alone
   CellCounter cells_;
   Neighbors near_;
   /// A pair near H, and the least distance that fp32 may find.

@@ -37,12 +37,11 @@ void search_all_pairs(const Scene& scene, const Eigen::Matrix3Xd& fluid,
   }
 }
 
-/// Fluid particles sorted by cell, cells at least H wide.
+/// Fluid particles sorted by cell, cells at least a radius wide.
 class CellList {
  public:
-  CellList(const Scene& scene, const Eigen::Matrix3Xd& x)
-      : separation_(scene.domain),
-        squared_support_(scene.support_radius() * scene.support_radius()) {
+  CellList(const Scene& scene, const Eigen::Matrix3Xd& x, double radius)
+      : separation_(scene.domain), squared_radius_(radius * radius) {
     const Domain& domain = scene.domain;
     periodic_ = domain.periodic;
     Vec3 high;
@@ -51,8 +50,8 @@ class CellList {
       high[a] = periodic_[a] ? domain.max[a] : x.row(a).maxCoeff();
     }
     // A lone outlier must not cost memory: cells grow until there are few for each particle.
-    // The margin keeps a rounded cell index from hiding a pair just inside H.
-    double width = scene.support_radius() * (1 + 1e-9);
+    // The margin keeps a rounded cell index from hiding a pair just inside the radius.
+    double width = radius * (1 + 1e-9);
     const double most = 32.0 * static_cast<double>(x.cols()) + 4096;
     for (;; width *= 1.5) {
       double cells = 1;
@@ -64,7 +63,7 @@ class CellList {
       count_[a] = std::max(1, static_cast<int>(std::floor(extent / width)));
       // Fewer than three cells around a period would be met twice.
       if (periodic_[a] && count_[a] < 3) count_[a] = 1;
-      // The last cell takes the remainder, so that none is narrower than H.
+      // The last cell takes the remainder, so that none is narrower than the radius.
       inverse_width_[a] = count_[a] > 1 ? count_[a] / extent : 0.0;
     }
     const std::size_t cells = static_cast<std::size_t>(count_[0]) * count_[1] * count_[2];
@@ -87,7 +86,7 @@ class CellList {
     }
   }
 
-  /// Ids of the particles within H of a point, in no order.
+  /// Ids of the particles within the radius of a point, in no order.
   void within(const Vec3& x, std::vector<std::int32_t>& found) const {
     found.clear();
     std::array<int, 3> c, first, last;
@@ -121,7 +120,7 @@ class CellList {
     for (std::size_t k = begin; k < end; ++k) {
       found[n] = id_[k];
       const Vec3 x_k = position_.col(static_cast<Eigen::Index>(k));
-      n += separation_(x_k, x).squaredNorm() < squared_support_;
+      n += separation_(x_k, x).squaredNorm() < squared_radius_;
     }
     found.resize(n);
   }
@@ -137,7 +136,7 @@ class CellList {
   }
 
   Separation separation_;
-  double squared_support_;
+  double squared_radius_;
   Vec3 low_, inverse_width_;
   std::array<int, 3> count_;
   std::array<bool, 3> periodic_;
@@ -146,18 +145,21 @@ class CellList {
   Eigen::Matrix3Xd position_;
 };
 
+/// Hands every ordered pair of fluid particles and every pair with a wall to a function, ids of the second
+/// one ascending. \param add  (i, j, whether j is a wall)
+template <class Add>
 void search_cells(const Scene& scene, const Eigen::Matrix3Xd& fluid, const Eigen::Matrix3Xd& wall,
-                  Neighbors& out) {
-  const CellList cells(scene, fluid);
+                  double radius, Add add) {
+  const CellList cells(scene, fluid, radius);
   std::vector<std::int32_t> near;
   for (std::int32_t j = 0; j < fluid.cols(); ++j) {
     cells.within(fluid.col(j), near);
     for (const auto i : near)
-      if (i != j) out.fluid[i].push_back(j);
+      if (i != j) add(i, j, false);
   }
   for (std::int32_t b = 0; b < wall.cols(); ++b) {
     cells.within(wall.col(b), near);
-    for (const auto i : near) out.wall[i].push_back(b);
+    for (const auto i : near) add(i, b, true);
   }
 }
 
@@ -171,7 +173,29 @@ void find_neighbors(const Scene& scene, const Eigen::Matrix3Xd& fluid, const Eig
   if (search == NeighborSearch::all_pairs)
     search_all_pairs(scene, fluid, wall, out);
   else
-    search_cells(scene, fluid, wall, out);
+    search_cells(scene, fluid, wall, scene.support_radius(),
+                 [&](std::int32_t i, std::int32_t j, bool is_wall) {
+                   (is_wall ? out.wall : out.fluid)[i].push_back(j);
+                 });
+}
+
+void find_neighbors_and_shell(const Scene& scene, const Eigen::Matrix3Xd& fluid,
+                              const Eigen::Matrix3Xd& wall, double shell, Neighbors& out,
+                              Neighbors& near_H) {
+  for (Neighbors* lists : {&out, &near_H}) {
+    clear(lists->fluid, fluid.cols());
+    clear(lists->wall, fluid.cols());
+  }
+  if (fluid.cols() == 0) return;
+  const Separation separation(scene.domain);
+  const double H = scene.support_radius(), squared_support = H * H;
+  const double squared_least = H > shell ? (H - shell) * (H - shell) : 0;
+  search_cells(scene, fluid, wall, H + shell, [&](std::int32_t i, std::int32_t j, bool is_wall) {
+    const Vec3 x_i = fluid.col(i), x_j = is_wall ? wall.col(j) : fluid.col(j);
+    const double squared = separation(x_i, x_j).squaredNorm();
+    if (squared < squared_support) (is_wall ? out.wall : out.fluid)[i].push_back(j);
+    if (squared >= squared_least) (is_wall ? near_H.wall : near_H.fluid)[i].push_back(j);
+  });
 }
 
 }  // namespace decant

@@ -53,4 +53,10 @@ enum class NeighborSearch { all_pairs, cells };
 void find_neighbors(const Scene& scene, const Eigen::Matrix3Xd& fluid, const Eigen::Matrix3Xd& wall,
                     NeighborSearch search, Neighbors& out);
 
+/// The same lists, and in `near_H` the pairs with H − shell <= r < H + shell, from one search.
+/// \param shell  m, > 0
+void find_neighbors_and_shell(const Scene& scene, const Eigen::Matrix3Xd& fluid,
+                              const Eigen::Matrix3Xd& wall, double shell, Neighbors& out,
+                              Neighbors& near_H);
+
 }  // namespace decant

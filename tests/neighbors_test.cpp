@@ -70,6 +70,20 @@ bool agree(const Scene& scene, const Eigen::Matrix3Xd& fluid,
   return true;
 }
 
+/// Pairs of the lists whose distance is `shell` or less from 1 m: those a search beyond it gives.
+Lists around_support(const Scene& scene, const Eigen::Matrix3Xd& of, const Eigen::Matrix3Xd& in, bool self,
+                     double shell) {
+  const Separation separation(scene.domain);
+  Lists lists(static_cast<std::size_t>(of.cols()));
+  for (Eigen::Index i = 0; i < of.cols(); ++i)
+    for (Eigen::Index j = 0; j < in.cols(); ++j) {
+      const double r = separation(Vec3(of.col(i)), Vec3(in.col(j))).norm();
+      if (std::abs(r - 1) < shell && !(self && i == j))
+        lists[static_cast<std::size_t>(i)].push_back(static_cast<std::int32_t>(j));
+    }
+  return lists;
+}
+
 /// Both searches' lists of a few points, as one.
 Lists fluid_lists(const Scene& scene, const Eigen::Matrix3Xd& x) {
   EXPECT_TRUE(agree(scene, x));
@@ -103,6 +117,21 @@ TEST(Neighbors, AreTheSameByCellsAsByDefinitionOnPeriodicAxes) {
       for (int a = 0; a < 3; ++a)
         x->row(a) = x->row(a).array() * (period[a] > 0 ? period[a] : size) + low;
     RC_ASSERT(agree(scene, fluid, wall));
+  }));
+}
+
+TEST(Neighbors, AreTheSameBesideThoseNearTheSupportsEnd) {
+  EXPECT_TRUE(rc::check("shell", [] {
+    const Scene scene = unit_support(Vec3::Zero(), coin() ? Vec3(5, 0, 4) : Vec3::Zero());
+    const Eigen::Matrix3Xd fluid = any_cloud(integer(0, 120), 0, 4), wall = any_cloud(integer(0, 60), 0, 4);
+    const double shell = real(0.001, 0.9);
+    Neighbors out, near_H;
+    near_H.fluid = {{3}};
+    find_neighbors_and_shell(scene, fluid, wall, shell, out, near_H);
+    const Neighbors expected = found(scene, fluid, wall, NeighborSearch::cells);
+    RC_ASSERT(out.fluid == expected.fluid && out.wall == expected.wall);
+    RC_ASSERT(near_H.fluid == around_support(scene, fluid, fluid, true, shell));
+    RC_ASSERT(near_H.wall == around_support(scene, fluid, wall, false, shell));
   }));
 }
 

@@ -74,7 +74,7 @@ class Pairs:
         i, j, d, x_ij, r = i[keep], j[keep], d[keep], d_near[keep], r[keep]
         turned = np.abs(d - x_ij)
         e = u * H * ((np.abs(x[i]) < H) * 1.0 + (np.abs(y[j]) < H))
-        e = e + np.where(turned > 0, u * (3 * turned + np.abs(x[i])), 0)
+        e = e + np.where(turned > 0, u * (3 * turned + np.abs(x[i]) + np.abs(x_ij)), 0)
         if error is not None:
             e = e + error[j]
         delta = 8 * u * H + np.sqrt((e ** 2).sum(axis=1))
@@ -82,6 +82,7 @@ class Pairs:
         self.near = i[near], j[near], x_ij[near], np.minimum(r[near], H) - delta[near]
         inside = r < H
         self.i, self.j, self.x, self.r, self.e = (a[inside] for a in (i, j, x_ij, r, e))
+        self.turned = turned[inside] > 0
         size = np.sqrt((self.e ** 2).sum(axis=1))
         self.along = np.where(self.r > 0, (np.abs(self.x) * self.e).sum(axis=1) /
                               np.where(self.r > 0, self.r, 1), size)
@@ -197,6 +198,11 @@ class Oracle:
         steep = np.where(w.r > 0, self.rho0 * self.V[w.j] * self.dW(w.r) / np.where(w.r > 0, w.r, 1), 0)
         volumes = total(n, w.i, self.rho0 * self.tau_V[w.j] * self.W(w.r))
         shifts = [u * (self.k_W + 4) * rho, *total(n, w.i, steep[:, None] * w.x * w.e).T, volumes]
+        f = self.fluid
+        steep_f = np.where(f.r > 0, self.m * self.dW(f.r) / np.where(f.r > 0, f.r, 1), 0)
+        for side in (1, -1):
+            shifts += [*sum(total(n, p.i, s[:, None] * np.where(p.turned & (side * p.x > 0), np.abs(p.x) * p.e, 0))
+                            for p, s in ((f, steep_f), (w, steep))).T]
         return [np.where(tau_p == 0, 0, s * slope) for s in shifts]
 
     def accelerations(self, rho, p, tau_rho, tau_p, in_common=()):
