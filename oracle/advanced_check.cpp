@@ -1,12 +1,10 @@
 /// \file
-/// Runs, looks, and the oracle's answer at each.
+/// Views of a run, and the oracle's answer at each.
 #include "oracle/advanced_check.hpp"
 
 #include "oracle/field_checks.hpp"
 
 #include <fmt/format.h>
-
-#include <algorithm>
 
 namespace decant {
 namespace {
@@ -31,35 +29,32 @@ std::string objection(const ParticleState& s, const Fixture& fixture, std::int64
 
 }  // namespace
 
-std::vector<int> advanced_stretches(Eigen::Index particles, std::int64_t substeps) {
-  std::vector<int> all{1, 3, 7, 17};
-  if (particles > 2000) all = {2, 9};
-  if (particles > 20000) all = {7};
-  for (int& stretch : all) {
-    stretch = static_cast<int>(std::min<std::int64_t>(stretch, substeps));
-    substeps -= stretch;
-  }
-  std::erase(all, 0);
+std::vector<int> viewed_after(Eigen::Index particles, std::int64_t substeps) {
+  std::vector<int> all{1, 4, 11, 28};
+  if (particles > 2000) all = {9, 25};
+  if (particles > 20000) all = {16};
+  std::erase_if(all, [&](int after) { return after > substeps; });
   return all;
 }
 
-void judge_advanced(Backend& backend, const Fixture& fixture, const Walls& walls,
+View view(Backend& backend, Eigen::Index particles, Eigen::Index walls, std::int64_t substeps) {
+  View v;
+  v.substeps = substeps;
+  backend.read(v.state);
+  v.fields = Fields::unwritten(particles, walls);
+  v.status = backend.evaluate(v.fields);
+  return v;
+}
+
+void judge_advanced(const std::vector<View>& views, const Fixture& fixture, const Walls& walls,
                     const WallAnswer& volumes, Sheet& sheet) {
-  backend.load(fixture.scene, walls, fixture.state);
-  std::int64_t done = 0;
-  for (const int stretch : advanced_stretches(fixture.state.size(), fixture.ensemble.substeps)) {
-    if (const Status status = backend.advance(stretch); !status.ok())
-      return sheet.failed("advanced", describe(status));
-    done += stretch;
-    ParticleState state;
-    backend.read(state);
-    if (const std::string why = objection(state, fixture, fixture.state.substep + done); !why.empty())
+  for (const View& v : views) {
+    if (const std::string why = objection(v.state, fixture, fixture.state.substep + v.substeps);
+        !why.empty())
       return sheet.failed("advanced", why);
-    Fields got = Fields::unwritten(state.size(), walls.size());
-    if (const Status status = backend.evaluate(got); !status.ok())
-      return sheet.failed("advanced", describe(status));
-    judge_fields("advanced", fmt::format(" after {}", done), got,
-                 answer(fixture.scene, walls, volumes, state), sheet);
+    if (!v.status.ok()) return sheet.failed("advanced", describe(v.status));
+    judge_fields("advanced", fmt::format(" after {}", v.substeps), v.fields,
+                 answer(fixture.scene, walls, volumes, v.state), sheet);
   }
 }
 

@@ -1,6 +1,6 @@
 /// \file
-/// The check `advanced`: fields of what a backend has in use after a run, which it carried along: lists,
-/// orders, places of walls.
+/// The check `advanced`: fields of what a backend has in use in the middle of a run, which it carried along:
+/// lists, orders, places of walls.
 #pragma once
 
 #include "oracle/backend.hpp"
@@ -12,14 +12,25 @@
 
 namespace decant {
 
-/// Substeps from one look to the next: on small fixtures many, of odd and growing lengths, so that some end
-/// just after a list was made and some just before it is made anew. No more than `substeps` together.
-std::vector<int> advanced_stretches(Eigen::Index particles, std::int64_t substeps);
+/// What a backend gives at one moment of a run: its state and, evaluated without a load, its fields.
+struct View {
+  std::int64_t substeps = 0;  // since the fixture's state
+  ParticleState state;
+  Fields fields;
+  Status status;  // of the evaluation
+};
 
-/// Rows of neighbor facts, density, pressure and accelerations after each stretch, "density after 7", the
-/// number counted from the fixture's state: the state is read, and the backend's fields, evaluated without a
-/// load, are held to the oracle's answer at the state that was read. No longer than the fixture's ensemble.
-void judge_advanced(Backend& backend, const Fixture& fixture, const Walls& walls,
+/// Substeps after which a run is viewed: on small fixtures often, at odd and growing distances, so that
+/// some views are just after a list was made and some just before it is made anew, which a backend may do
+/// whenever it is interrupted: the longest stretch is half of a run. None after `substeps`.
+std::vector<int> viewed_after(Eigen::Index particles, std::int64_t substeps);
+
+/// Reads the state, then evaluates.
+View view(Backend& backend, Eigen::Index particles, Eigen::Index walls, std::int64_t substeps);
+
+/// Rows of neighbor facts, density, pressure and accelerations for each view, "density after 7": the fields
+/// are held to the oracle's answer at the state that was read.
+void judge_advanced(const std::vector<View>& views, const Fixture& fixture, const Walls& walls,
                     const WallAnswer& volumes, Sheet& sheet);
 
 }  // namespace decant

@@ -53,7 +53,7 @@ struct PairTotals {
 };
 
 struct NeighborStats {
-  std::int64_t rebuilds = 0;
+  std::int64_t rebuilds = 0;             // since `load`
   std::int64_t device_bytes = 0;         // memory held; 0: not told
   double mean_fluid = 0, mean_wall = 0;  // neighbors a particle at the last evaluation
   PairTotals verified;                   // of lists that verify themselves, since `load`

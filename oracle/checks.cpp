@@ -70,7 +70,8 @@ const std::vector<CheckDescription>& check_descriptions() {
        "the contact distance.",
        "What happens between two looks and is undone."},
       {"determinism",
-       "Two evaluations and two runs from the same state give the same bits.",
+       "Two evaluations and two runs from the same state give the same bits, and the same numbers of rebuilds "
+       "and, where lists verify themselves, of pairs.",
        "Exact: the number of values that differ is 0.",
        "A race that did not happen this time."},
       {"conservation",

@@ -26,6 +26,12 @@ struct TransformedAnswer {
   OracleAnswer answer;
 };
 
+/// A part of a run, after which its state is read.
+struct Stretch {
+  int substeps = 0;
+  bool viewed = false;  // fields are evaluated too (oracle/advanced_check.hpp)
+};
+
 /// Everything the oracle has to say about one fixture. Made once, used for every backend.
 struct Judgement {
   Walls walls;
@@ -37,7 +43,8 @@ struct Judgement {
   SubstepAnswer substep;
   std::vector<ContactProblem> contact;
   // The oracle's own run, as long as the fixture's ensemble is, and looked at as backends' runs are.
-  std::vector<int> stretches;
+  std::vector<Stretch> stretches;
+  std::size_t repeated = 0;  // so many of them, a quarter of the run or more, show that it is reproducible
   ParticleState later;
   AuditResult later_look;
   double deepest = 0;  // m, inside a wall, at any look
@@ -57,8 +64,8 @@ std::string weakness(const OracleAnswer& answer);
 /// Evaluates the oracle on the fixture's state, as far as these checks need it. Throws InputError where
 /// the recorded fields, if there are any, are not what this build's reference gives within the tolerances scaled from 2⁻²⁴
 /// to 2⁻⁵³.
-/// \param look_every  substeps between two looks at a run, for containment and mass; 0: after half of it,
-///                    half of the rest, and so on
+/// \param look_every  substeps between two looks at a run, for containment and mass; 0: where it is viewed,
+///                    after half of the rest, and so on
 Judgement prepare(const Fixture& fixture, const CheckSelection& checks = all_checks(),
                   int look_every = 0);
 

@@ -2,6 +2,7 @@
 /// Runs of some tens of substeps, looked at on the way.
 #include "oracle/run_checks.hpp"
 
+#include "oracle/advanced_check.hpp"
 #include "oracle/audit.hpp"
 #include "oracle/field_checks.hpp"
 
@@ -19,23 +20,33 @@ namespace {
 /// What a run left behind.
 struct Run {
   Status status;
-  ParticleState first, end;  // after the first stretch, after all
+  ParticleState early, end;  // after the oracle's `repeated` stretches, after all
+  NeighborStats counted;     // then
   std::vector<AuditResult> looks;
+  std::vector<View> views;
 };
 
-Run run(Backend& backend, const Scene& scene, const Walls& walls, const ParticleState& start,
-        const std::vector<int>& stretches) {
+/// A run of the oracle's first `count` stretches.
+Run run(Backend& backend, const Fixture& fixture, const Judgement& oracle, std::size_t count) {
+  const ParticleState& start = fixture.state;
   Run r;
-  backend.load(scene, walls, start);
-  Audit audit(scene);
+  backend.load(fixture.scene, oracle.walls, start);
+  Audit audit(fixture.scene);
   audit.look(start);
-  for (const int stretch : stretches) {
-    r.status = backend.advance(stretch);
+  std::int64_t done = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const Stretch& stretch = oracle.stretches[k];
+    r.status = backend.advance(stretch.substeps);
     if (!r.status.ok()) return r;
+    done += stretch.substeps;
     backend.read(r.end);
     if (r.end.position.cols() != start.size() || r.end.velocity.cols() != start.size()) return r;
-    if (r.looks.empty()) r.first = r.end;
+    if (k + 1 == oracle.repeated) {
+      r.early = r.end;
+      r.counted = backend.neighbor_stats();
+    }
     r.looks.push_back(audit.look(r.end));
+    if (stretch.viewed) r.views.push_back(view(backend, start.size(), oracle.walls.size(), done));
   }
   return r;
 }
@@ -142,7 +153,7 @@ void judge_containment(const Run& r, const Scene& scene, const Judgement& oracle
   std::int64_t deepest_id = -1, crossed = 0, crossed_id = -1, when = -1, substep = 0;
   for (std::size_t k = 0; k < r.looks.size(); ++k) {
     const AuditResult& look = r.looks[k];
-    substep += oracle.stretches[k];
+    substep += oracle.stretches[k].substeps;
     if (look.deepest > deepest) {
       deepest = look.deepest;
       deepest_id = look.deepest_particle;
@@ -198,11 +209,15 @@ void judge_determinism(Backend& backend, const Fixture& fixture, const Judgement
   exact("fields", differing(a.density, b.density) + differing(a.pressure, b.pressure) +
                       differing(a.acceleration, b.acceleration) +
                       differing(a.boundary_volume, b.boundary_volume));
-  const Run second = run(backend, fixture.scene, oracle.walls, fixture.state,
-                         {oracle.stretches.front()});
+  const Run second = run(backend, fixture, oracle, oracle.repeated);
   if (!second.status.ok()) return sheet.failed("determinism", describe(second.status));
-  exact("run", differing(first.first.position, second.first.position) +
-                   differing(first.first.velocity, second.first.velocity));
+  exact("run", differing(first.early.position, second.early.position) +
+                   differing(first.early.velocity, second.early.velocity));
+  const auto &once = first.counted, &twice = second.counted;
+  exact("statistics", (once.rebuilds != twice.rebuilds) + (once.verified.pairs != twice.verified.pairs) +
+                          (once.verified.missed != twice.verified.missed) +
+                          (once.verified.wall_pairs != twice.verified.wall_pairs) +
+                          (once.verified.wall_missed != twice.verified.wall_missed));
 }
 
 /// Columns by the ids that particles had; a matrix of another number of them stays as it is.
@@ -245,20 +260,20 @@ void judge_invariance(Backend& backend, const Judgement& oracle, Sheet& sheet) {
 void judge_runs(Backend& backend, const Fixture& fixture, const Judgement& oracle,
                 const CheckSelection& checks, Sheet& sheet) {
   const auto wanted = [&](const char* name) { return checks.count(name) > 0; };
-  const bool runs = wanted("trajectory") || wanted("mass") || wanted("containment") ||
-                    wanted("determinism");
-  if (runs) {
-    const Run r = run(backend, fixture.scene, oracle.walls, fixture.state, oracle.stretches);
+  if (!oracle.stretches.empty()) {
+    const Run r = run(backend, fixture, oracle, oracle.stretches.size());
     const bool whole = r.end.position.cols() == fixture.state.size() &&
                        r.end.velocity.cols() == fixture.state.size();
-    for (const char* name : {"trajectory", "mass", "containment", "determinism"}) {
-      if (!wanted(name)) continue;
+    for (const char* name : {"advanced", "trajectory", "mass", "containment", "determinism"}) {
+      if (!checks.count(name)) continue;
       if (!r.status.ok()) {
         sheet.failed(name, describe(r.status));
       } else if (!whole) {
         sheet.failed(name, fmt::format("{} positions and {} velocities, not {}",
                                        r.end.position.cols(), r.end.velocity.cols(),
                                        fixture.state.size()));
+      } else if (name == std::string("advanced")) {
+        judge_advanced(r.views, fixture, oracle.walls, oracle.volumes, sheet);
       } else if (name == std::string("trajectory")) {
         judge_trajectory(r, fixture, oracle, sheet);
       } else if (name == std::string("mass")) {

@@ -1,5 +1,5 @@
 /// \file
-/// The checks that run a backend: trajectory, mass, containment, determinism; and those that need
+/// The checks that run a backend: advanced, trajectory, mass, containment, determinism; and those that need
 /// more than one of its answers: conservation, invariance. Used by `judge`.
 #pragma once
 

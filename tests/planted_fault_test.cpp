@@ -153,7 +153,7 @@ const Fault catalogue[] = {
      scene_edit([](Scene& s) { s.contact.friction *= 1.001; })},
     {"RestitutionOffByAThousandth", "contact", "velocity",
      scene_edit([](Scene& s) { s.contact.restitution *= 1.001; })},
-    {"NeighborLostInARun", "advanced", "fluid_neighbor_count after 11", [] {
+    {"NeighborLostInARun", "advanced", "fluid_neighbor_count after 9", [] {
        Edit edit;
        edit.found = [searches = 0](const Scene&, Neighbors& n, Eigen::VectorXd&) mutable {
          if (++searches > 5) longest(n.fluid).pop_back();
@@ -252,7 +252,7 @@ TEST(Containment, NamesTheSubstepWhereAsked) {
     if (s.substep - fixture.state.substep >= 5) s.position.col(20) = Vec3(0, 0, 0.012);
   };
   const CheckSelection alone{"containment"};
-  for (const auto& [look_every, found] : {std::pair(1, "first seen 5 "), std::pair(0, "first seen 16 ")}) {
+  for (const auto& [look_every, found] : {std::pair(1, "first seen 5 "), std::pair(0, "first seen 9 ")}) {
     EditedReference backend(edit);
     std::string reason;
     for (const CheckRow& row : judge(backend, fixture, prepare(fixture, alone, look_every), alone))
