@@ -133,13 +133,14 @@ void ContactBounds::contact(std::size_t container, const Pose& pose, BoundedPart
     if (!solid.may_be_within(reach + e, local)) return;
     const SurfaceDistance surface = solid.at(local);
     if (!p.touches(surface.distance, reach, e)) return;
-    double tau_n = turn_of_normal(solid, local, surface, e) + 4 * u +
-                   4 * u * local.norm() / std::abs(surface.distance);
+    double tau_n = turn_of_normal(solid, local, surface, e) + 4 * u;
     if (turns(pose)) tau_n += 8 * u;
     const double tie = std::sqrt(6 * u);
-    if (near_seam(container, local - surface.distance * surface.normal,
-                  std::abs(surface.distance) * tie + 2 * e))
-      tau_n += tie;
+    const bool seam = near_seam(container, local - surface.distance * surface.normal,
+                                std::abs(surface.distance) * tie + 2 * e);
+    if (seam) tau_n += tie;
+    // A difference of near points; beside a box's face it has one component only.
+    if (seam || faces_[container].empty()) tau_n += 4 * u * local.norm() / std::abs(surface.distance);
     if (!(tau_n <= 0.1)) {
       p.ambiguous = true;
       tau_n = 2;

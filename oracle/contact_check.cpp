@@ -40,7 +40,8 @@ class Draw {
 
 /// A place on a surface.
 struct Surface {
-  Vec3 at, normal;  // m, container frame
+  Vec3 at, normal;    // m, container frame
+  bool flat = false;  // its normal is the same all around, and that of a point on it no difference of near points
 };
 
 /// One in three at an end or edge, where two faces meet.
@@ -55,7 +56,7 @@ Surface on_edge(const ProfileEdge& e, Draw& draw) {
 }
 
 Surface on_face(const BoxFace& f, Draw& draw) {
-  Surface s{f.min, f.side * Vec3::Unit(f.axis)};
+  Surface s{f.min, f.side * Vec3::Unit(f.axis), true};
   for (int a = 0; a < 3; ++a)
     if (a != f.axis) s.at[a] += fraction(draw) * (f.max[a] - f.min[a]);
   return s;
@@ -116,12 +117,13 @@ class Probes {
         for (int k = 0; k < each; ++k) add_at(c, on_edge(e, draw_));
       for (const auto& f : bounds_.faces(c))
         for (int k = 0; k < each; ++k) add_at(c, on_face(f, draw_));
+      add_level_with_corners(c);
     }
     for (int k = 0; k < each && scene_.floor; ++k) {
       Vec3 x = scene_.domain.min;
       for (int a = 0; a < 2; ++a) x[a] = draw_(scene_.domain.min[a], scene_.domain.max[a]);
       x.z() = scene_.floor->height;
-      add_at(scene_.containers.size(), {x, Vec3::UnitZ()});
+      add_at(scene_.containers.size(), {x, Vec3::UnitZ(), true});
     }
   }
 
@@ -164,10 +166,23 @@ class Probes {
     return state;
   }
 
+  /// Ones at rest beside an upright container that stands still, exactly as high as a corner of its outline: whether
+  /// such a point is inside must not depend on which of two edges a corner belongs to.
+  void add_level_with_corners(std::size_t c) {
+    const Pose& pose = poses_[1][c];
+    if (moves(scene_.containers[c]) || !pose.rotation.isIdentity(0)) return;
+    for (const ProfileEdge& e : bounds_.edges(c))
+      for (const double share : {0.35, 0.8}) {
+        const double r = share * e.r0, angle = draw_(0, 2 * std::numbers::pi);
+        add(pose.translation + Vec3(r * std::cos(angle), r * std::sin(angle), e.z0), pose.surface_velocity);
+      }
+  }
+
   /// One that meets the surface of container c (its number: the floor), now or some substeps on.
   void add_at(std::size_t c, const Surface& surface) {
     static constexpr int when[] = {1, 1, 1, 1, 2, 4, 8};
-    static constexpr double depth[] = {0.9, 0.6, 0.2, -0.5, -2.0};  // contact distances
+    static constexpr double depth[] = {0.9, 0.6, 0.2, -0.5, -2.0, 0};  // contact distances
+    const int depths = surface.flat ? 6 : 5;
     const int steps = when[draw_.below(7)], way = draw_.below(5);
     const Pose pose = c < scene_.containers.size() ? poses_[static_cast<std::size_t>(steps)][c] : Pose{};
     const double dt = scene_.time_step(), reach = scene_.contact_distance();
@@ -188,7 +203,7 @@ class Probes {
     }
     // After some flight no deeper than a substep's way can be.
     const double closing = std::max(0.0, (wall - v).dot(normal)) * dt;
-    x += (steps == 1 ? depth[draw_.below(5)] * reach : reach - draw_(0.1, 0.9) * closing) * normal;
+    x += (steps == 1 ? depth[draw_.below(depths)] * reach : reach - draw_(0.1, 0.9) * closing) * normal;
     add(x - steps * dt * v, v);
   }
 
