@@ -33,6 +33,10 @@ Outcome failed(const std::string& backend, const char* property, std::string rea
 constexpr std::array runs = {"advanced",    "trajectory",  "sequence",    "mass",
                              "containment", "determinism", "lists"};
 
+/// Those that hold where every substep is what the oracle makes of the state before it: where fp32 cannot
+/// tell to which of two faces a particle is pushed, runs part for good, and two may end in one corner.
+const std::set<std::string> follow_from_steps = {"trajectory", "mass", "containment"};
+
 /// The property's rows, joined to the worst.
 Outcome joined(const std::string& backend, const std::string& property,
                const std::vector<CheckRow>& rows) {
@@ -90,7 +94,12 @@ bool each_step_holds(Backend& backend, const Fixture& f, const Walls& walls,
   Fixture now = f;
   for (int k = 1; k <= run_substeps; ++k) {
     const Judgement oracle = prepare(now, {"substep"});
-    const ParticleState next = state_after(backend, f, walls, parts, interrupted, k);
+    ParticleState next;
+    try {
+      next = state_after(backend, f, walls, parts, interrupted, k);
+    } catch (const BackendError&) {
+      return false;
+    }
     Sheet sheet(backend.info(), f.name);
     judge_substep(next, all_answered(), now, oracle, sheet);
     if (!joined("", "substep", sheet.take()).holds) return false;
@@ -297,7 +306,7 @@ std::vector<Outcome> Tester::outcomes(const Fixture& problem, std::uint64_t seed
       for (const auto& property : checks) {
         Outcome o = trouble.empty() ? joined(name, property, rows)
                                     : failed(name, property.c_str(), trouble);
-        if (property == "trajectory" && !o.holds && std::isfinite(o.score))
+        if (follow_from_steps.contains(property) && !o.holds && trouble.empty())
           o.holds = each_step_holds(backend(name), fixture, oracle.walls, {run_substeps}, false);
         all.push_back(std::move(o));
       }
