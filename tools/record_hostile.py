@@ -104,6 +104,26 @@ def astray(rng, fixtures):
                                     lambda x: np.hypot(x[0], x[1]) > 0.0135 or not 0.0005 < x[2] < 0.0195))])
 
 
+def block(rng, counts, corner, apart=0.0042):
+    """A jittered lattice with its first point at a corner."""
+    x = np.stack(np.meshgrid(*[np.arange(n) for n in counts]), -1).reshape(-1, 3)
+    return (x + rng.uniform(-0.1, 0.1, x.shape)) * apart + corner
+
+
+def flying(rng):
+    """(name, scene, time, positions, velocities): states that need velocities of their own."""
+    bouncing = block(rng, (6, 6, 4), [0.13, -0.008, 0.004])
+    yield "bounce", "hostile-bounce", 0.0, bouncing, np.broadcast_to([0.4, 0.0, -2.2], bouncing.shape)
+
+    jet = np.concatenate([block(rng, (5, 5, 5), [0.0415, -0.0084, -0.0084]),
+                          block(rng, (2, 4, 4), [0.0285, -0.006, -0.006])])
+    yield "post", "hostile-post", 0.0, jet, np.where(jet[:, :1] > 0.035, [[2.9, 0.1, 0.0]], [[0.0, 0.0, 0.0]])
+
+    # As beside the fast wall, where it still moves by a small part of the skin in a substep.
+    beside = block(rng, (4, 6, 5), [0.0365, -0.013, 0.012], 0.0052)
+    yield "slow-wall", "hostile-fast-wall", 0.002, beside, np.zeros_like(beside)
+
+
 def states(rng):
     """(name, scene, positions): each a way in which a port breaks."""
     yield "empty", "hostile-cup", np.zeros((0, 3))
@@ -161,14 +181,19 @@ def states(rng):
     yield "gathering", "hostile-gathering", (ball + rng.uniform(-0.15, 0.15, ball.shape)) * 0.004
 
 
-def motion(name, scene, position):
-    """(velocity, time) of a state."""
-    if name == "fast-wall":
-        return np.zeros_like(position), 0.0122
-    if name == "gathering":
-        return -120.0 * position, 0.0
-    velocity = np.random.default_rng(7).uniform(-0.2, 0.2, position.shape)
-    return velocity, 0.2 if scene == "hostile-cup" else 0.0
+def problems(fixtures):
+    """(name, scene, time, positions, velocities) of all."""
+    for name, scene, position in states(np.random.default_rng(20250726)):
+        velocity = np.random.default_rng(7).uniform(-0.2, 0.2, position.shape)
+        time = 0.2 if scene == "hostile-cup" else 0.0
+        if name == "fast-wall":
+            velocity, time = np.zeros_like(position), 0.0122
+        if name == "gathering":
+            velocity = -120.0 * position
+        yield name, scene, time, position, velocity
+    for name, time, position in astray(np.random.default_rng(19), fixtures):
+        yield name, f"hostile-{name}", time, position, np.random.default_rng(7).uniform(-0.2, 0.2, position.shape)
+    yield from flying(np.random.default_rng(8))
 
 
 def main():
@@ -177,14 +202,9 @@ def main():
     p.add_argument("--fixtures", type=Path, default=Path("fixtures"))
     p.add_argument("--only", nargs="*", help="names")
     a = p.parse_args()
-    problems = [(name, scene, 0.2 if scene == "hostile-cup" else 0.0, position)
-                for name, scene, position in states(np.random.default_rng(20250726))]
-    problems += [(name, f"hostile-{name}", time, position)
-                 for name, time, position in astray(np.random.default_rng(19), a.fixtures)]
-    for name, scene, time, position in problems:
+    for name, scene, time, position, velocity in problems(a.fixtures):
         if a.only and name not in a.only:
             continue
-        velocity, time = motion(name, scene, position)
         with tempfile.TemporaryDirectory() as folder:
             state = Path(folder) / f"{name}.h5"
             with h5py.File(state, "w", libver="v108") as f:
