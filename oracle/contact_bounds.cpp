@@ -53,6 +53,12 @@ ContactBounds::ContactBounds(const Scene& scene)
     const auto* revolved = std::get_if<RevolvedShape>(&c.shape);
     edges_.push_back(revolved ? surface_edges(*revolved) : std::vector<ProfileEdge>{});
     faces_.push_back(revolved ? std::vector<BoxFace>{} : exposed_faces(std::get<BoxShape>(c.shape)));
+    double& extent = extents_.emplace_back(0);
+    for (const ProfileEdge& e : edges_.back()) extent = std::max({extent, std::abs(e.r0), std::abs(e.z0)});
+    for (const BoxFace& f : faces_.back())
+      for (int a = 0; a < 3; ++a)
+        if (std::isfinite(f.min[a]) && std::isfinite(f.max[a]))  // not along an endless axis
+          extent = std::max({extent, std::abs(f.min[a]), std::abs(f.max[a])});
   }
 }
 
@@ -135,12 +141,12 @@ void ContactBounds::contact(std::size_t container, const Pose& pose, BoundedPart
     if (!p.touches(surface.distance, reach, e)) return;
     double tau_n = turn_of_normal(solid, local, surface, e) + 4 * u;
     if (turns(pose)) tau_n += 8 * u;
-    const double tie = std::sqrt(6 * u);
-    const bool seam = near_seam(container, local - surface.distance * surface.normal,
-                                std::abs(surface.distance) * tie + 2 * e);
-    if (seam) tau_n += tie;
+    const double phi = std::abs(surface.distance), extent = std::max(local.norm(), extents_[container]);
+    const double tie = std::sqrt(6 * u * phi * phi + 8 * u * phi * extent);
+    const bool seam = near_seam(container, local - surface.distance * surface.normal, tie + 2 * e);
+    if (seam && phi > 0) tau_n += tie / phi;
     // A difference of near points; beside a box's face it has one component only.
-    if (seam || faces_[container].empty()) tau_n += 4 * u * local.norm() / std::abs(surface.distance);
+    if (seam || faces_[container].empty()) tau_n += 4 * u * local.norm() / phi;
     if (!(tau_n <= 0.1)) {
       p.ambiguous = true;
       tau_n = 2;

@@ -53,9 +53,10 @@ void each_decision(Run run, Take take) {
 ///               container turns: what pose and distance add to the distance from a wall
 ///   tau_n     = how far the normal turns within |tau_x| + epsilon, and 4u (1 + |x_local|/|phi|), and 8u
 ///               where the container turns
-///   seam      = √(6u) more where the nearest point is within |phi| √(6u) + 2 (|tau_x| + epsilon) of the end
-///               of a face or edge: which of two is nearest is told by squares of distances, each rounded by
-///               3u, so that the nearest point of a neighbor so far along may be taken
+///   seam      = s/|phi| more, s = √(6u phi² + 8u |phi| X), where the nearest point is within
+///               s + 2 (|tau_x| + epsilon) of the end of a face or edge: which of two is nearest is told by squares
+///               of distances, each rounded by 3u, from a nearest point rounded by 4u X, X the largest among |l| and
+///               the surface's coordinates; so that the nearest point of a neighbor s along may be taken
 ///   tau_x    <- |tau_x| + epsilon + (phi_c − phi)(tau_n + 2u) + 2u|x|: the way out cancels the error
 ///               along the normal
 ///   tau_wall  = |omega| (|tau_x| + 4u (|x| + |pivot| + |x − pivot|)) + 3u (|v_linear| + |v_surface| +
@@ -97,6 +98,7 @@ class ContactBounds {
   std::vector<SolidDistance> solids_;
   std::vector<std::vector<ProfileEdge>> edges_;  // of revolved containers
   std::vector<std::vector<BoxFace>> faces_;      // of the others
+  std::vector<double> extents_;                  // the surfaces' largest coordinates, m
 };
 
 }  // namespace decant

@@ -227,6 +227,7 @@ class Probes {
       outcomes.push_back({p.x, p.v, p.tau_x, p.tau_v});
       known = known && !p.ambiguous && p.undecided <= most_undecided;
     });
+    gather_images(scene_.domain, outcomes);
     return known;
   }
 

@@ -5,8 +5,18 @@
 #include "oracle/contact_bounds.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace decant {
+
+void gather_images(const Domain& domain, std::vector<SubstepOutcome>& outcomes) {
+  for (int a = 0; a < 3; ++a) {
+    if (!domain.periodic[static_cast<std::size_t>(a)]) continue;
+    const double period = domain.max[a] - domain.min[a], first = outcomes.front().position[a];
+    for (SubstepOutcome& outcome : outcomes)
+      outcome.position[a] -= period * std::round((outcome.position[a] - first) / period);
+  }
+}
 
 SubstepAnswer substep_answer(const Scene& scene, const ParticleState& state,
                              const OracleAnswer& fields) {
@@ -33,6 +43,7 @@ SubstepAnswer substep_answer(const Scene& scene, const ParticleState& state,
       answer.ambiguous[k] = true;
       answer.longest_push = std::max(answer.longest_push, p.pushed);
     });
+    gather_images(scene.domain, answer.outcomes[k]);
   }
   return answer;
 }

@@ -14,9 +14,13 @@ struct SubstepOutcome {
   Vec3 position_tolerance, velocity_tolerance;  // m, m/s
 };
 
+/// Moves each position by whole periods to where it is nearest to the first outcome's, so that what one contact
+/// decides is never a period.
+void gather_images(const Domain& domain, std::vector<SubstepOutcome>& outcomes);
+
 struct SubstepAnswer {
   /// Per particle the oracle's own outcome, then those with its undecidable contacts decided
-  /// otherwise.
+  /// otherwise, by the image nearest to it.
   std::vector<std::vector<SubstepOutcome>> outcomes;
   /// Particles left out: the nearest face cannot be told, or more than three contacts are open. Which
   /// side of a period a particle comes back in on does not matter: positions are compared by images.

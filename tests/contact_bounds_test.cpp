@@ -2,6 +2,7 @@
 /// Contact in single precision, in every form that is as good as another, stays within its bounds; what is
 /// wrong by a thousandth does not.
 #include "oracle/contact_bounds.hpp"
+#include "oracle/field_checks.hpp"
 #include "reference/shapes.hpp"
 
 #include <gtest/gtest.h>
@@ -197,6 +198,29 @@ TEST(ContactBounds, AreExceededByAThousandth) {
   restitution.restitution = 1.001f;
   before.wall_before_push = true;
   for (const Form& wrong : {friction, restitution, before}) EXPECT_GT(scores(scene, wrong, 4000).worst, 3);
+}
+
+/// One contact that fp32 cannot decide, and two answers that lie on either side of a period's end (fuzz seed 34106):
+/// an answer is held to the nearer one, whichever side it comes back in on.
+TEST(NearestImages, AreThoseOfTheOutcomeThatIsMeant) {
+  Scene scene;
+  scene.domain.min = Vec3(0, 0, -2);
+  scene.domain.max = Vec3(1, 1, -1.6875);
+  scene.domain.periodic = {false, false, true};
+  const Vec3 off = Vec3::Constant(2e-5);
+  for (const double z : {-1.68762561, -1.99991057}) {
+    std::vector<std::vector<SubstepOutcome>> outcomes{
+        {{{0.5, 0.5, -1.9999106}, Vec3::Zero(), off, off}, {{0.5001, 0.5, -1.6876256}, Vec3::Ones(), off, off}}};
+    gather_images(scene.domain, outcomes.front());
+    const bool second = z > -1.7;
+    ParticleState got;
+    got.position = Vec3(second ? 0.5001 : 0.5, 0.5, z);
+    got.velocity = second ? Vec3(Vec3::Ones()) : Vec3(Vec3::Zero());
+    got = nearest_images(got, scene, outcomes);
+    const NearestOutcomes nearest = nearest_outcomes(outcomes, got);
+    EXPECT_LT((nearest.position - got.position).cwiseAbs().maxCoeff(), 1e-6) << z;
+    EXPECT_EQ(nearest.velocity(0, 0), second ? 1 : 0);
+  }
 }
 
 }  // namespace
