@@ -135,8 +135,8 @@ void judge_substep(const ParticleState& answer_of_backend, const Answered& answe
   const ParticleState got = nearest_images(answer_of_backend, fixture.scene, answer.outcomes);
   const NearestOutcomes nearest = nearest_outcomes(answer.outcomes, got);
   // An undecidable push is no longer than a particle spacing, or than what pushes back from deep inside
-  // a wall, one way or the other, and no faster than sound.
-  const double apart = std::max(fixture.scene.particle_spacing, 2 * answer.longest_push);
+  // a wall: one projection the one way, and two as long the other way; and no faster than sound.
+  const double apart = std::max(fixture.scene.particle_spacing, 3 * answer.longest_push);
   judge_field("substep", "position", "m", answered,
               {flat(got.position), flat(nearest.position), flat(nearest.position_tolerance), {}, 3, &answer.ambiguous,
                answer.most_ambiguous, -infinity, apart},

@@ -27,7 +27,7 @@ struct SubstepAnswer {
   std::vector<bool> ambiguous;      // N
   std::int64_t most_ambiguous = 0;  // 2 % of the particles, and ten
   /// How far walls push any of those left out, all pushes of its substep together, m: one whose face
-  /// cannot be told may be pushed as far the other way.
+  /// cannot be told may be pushed twice as far the other way.
   double longest_push = 0;
 };
 
