@@ -225,9 +225,7 @@ TEST(Drift, ReportIsAsDocumented) {
   PourDrift pour{"scene", {{0.5, measured().samples[3]}}, {WholePour{}}};
   for (const auto& pours : {std::vector<PourDrift>{}, std::vector{pour}}) {
     write_drift(file, {measured()}, pours, {"list", "", "host", "here", "fp32"});
-    EXPECT_EQ(
-        test::run_python("'" DECANT_SOURCE_DIR "/tools/check_schema.py' '" + file.string() + "'"),
-        0);
+    EXPECT_EQ(test::run_python({DECANT_SOURCE_DIR "/tools/check_schema.py", file.string()}), 0);
   }
   const std::string table = drift_table({measured()});
   EXPECT_NE(table.find("safe interval"), std::string::npos);

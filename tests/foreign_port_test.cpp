@@ -2,6 +2,7 @@
 /// A port in another language: the example conforms, each of its faults fails the check that is
 /// there for it, and the Python writers give what the documents say.
 #include "oracle/port_inputs.hpp"
+#include "tests/python.hpp"
 #include "tests/results_fixture.hpp"
 
 #include <cstdlib>
@@ -12,31 +13,21 @@ namespace {
 
 const std::string root = DECANT_SOURCE_DIR;
 
-/// Exit status of a Python script with its arguments; its output goes to the test's.
-int python(const std::string& arguments) {
-  const std::string command = "PYTHONDONTWRITEBYTECODE=1 PYTHONPATH='" + root + "/tools' '" + root +
-                              "/build/venv/bin/python' " + arguments;
-  const int status = std::system(command.c_str());
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-}
-
-std::string in_quotes(const std::filesystem::path& path) { return "'" + path.string() + "'"; }
-
 int schema_of(const std::filesystem::path& file) {
-  return python(in_quotes(root + "/tools/check_schema.py") + " " + in_quotes(file));
+  return test::run_python({root + "/tools/check_schema.py", file.string()});
 }
 
 class ForeignPort : public test::ResultsFile {
  protected:
   void SetUp() override {
-    if (python("-c 'import h5py' 2>/dev/null") != 0)
-      GTEST_SKIP() << "no h5py in " << root << "/build/venv; ci/setup makes it";
+    if (!test::python_has("h5py")) GTEST_SKIP() << "no h5py in " << test::python() << "; ci/setup makes it";
+    setenv("PYTHONPATH", (root + "/tools").c_str(), 1);  // for scripts that import the writers
     write_port_inputs(inputs_file(), *fixture_, *oracle_);
   }
   static std::filesystem::path inputs_file() { return *folder_ / "inputs.h5"; }
   static int run_port(const std::string& fault) {
-    return python(in_quotes(root + "/tools/numpy_port.py") + " " + in_quotes(inputs_file()) +
-                  " --out " + in_quotes(results_file()) + " --fault " + fault);
+    return test::run_python({root + "/tools/numpy_port.py", inputs_file().string(), "--out",
+                             results_file().string(), "--fault", fault});
   }
 };
 
@@ -126,9 +117,7 @@ got = summed(terms.astype(np.float32)) * np.float32(sys.argv[3])
 write_results(sys.argv[2], {"force": got[order]}, id=order + 1)
 )";
   const auto judged_with = [&](const std::string& factor) {
-    EXPECT_EQ(python(in_quotes(script) + " " + in_quotes(reference_file()) + " " +
-                     in_quotes(results_file()) + " " + factor),
-              0);
+    EXPECT_EQ(test::run_python({script.string(), reference_file().string(), results_file().string(), factor}), 0);
     return judge_results_file({results_file(), {}, reference_file(), "port", {}}).status;
   };
   EXPECT_EQ(judged_with("1"), 0);
@@ -148,10 +137,8 @@ with h5py.File(sys.argv[1], "w", libver=("earliest", "v108")) as file:
     file.attrs["particles"] = int(sys.argv[2])
 )";
   const auto plain = *folder_ / "plain.h5";
-  ASSERT_EQ(python(in_quotes(script) + " " + in_quotes(plain) + " " +
-                   std::to_string(fixture_->state.size())), 0);
-  ASSERT_EQ(python(in_quotes(root + "/tools/results_file.py") + " " + in_quotes(plain) + " --out " +
-                   in_quotes(results_file())), 0);
+  ASSERT_EQ(test::run_python({script.string(), plain.string(), std::to_string(fixture_->state.size())}), 0);
+  ASSERT_EQ(test::run_python({root + "/tools/results_file.py", plain.string(), "--out", results_file().string()}), 0);
   EXPECT_EQ(judged().status, 3) << "is read, and gives nothing";
 }
 

@@ -215,18 +215,14 @@ TEST(Campaign, ReportsAreAsDocumentedAndMerge) {
   s.first_seed = 7;
   s.backends = {"reference"};
   write_campaign(b, run_campaign(s, with_a_fault), info);
-  const std::string tools = "'" DECANT_SOURCE_DIR "/tools/", quoted_a = " '" + a.string() + "'";
-  EXPECT_EQ(test::run_python(tools + "merge_fuzz.py'" + quoted_a + " '" + b.string() + "' --out '" +
-                             all.string() + "'"),
-            0);
+  const std::string tools = DECANT_SOURCE_DIR "/tools/";
+  EXPECT_EQ(test::run_python({tools + "merge_fuzz.py", a.string(), b.string(), "--out", all.string()}), 0);
   for (const auto& file : {a, b, all})
-    EXPECT_EQ(test::run_python(tools + "check_schema.py' '" + file.string() + "'"), 0) << file;
+    EXPECT_EQ(test::run_python({tools + "check_schema.py", file.string()}), 0) << file;
   const Hdf5Reader merged(all);
   EXPECT_EQ(merged.integer_attribute("/", "cases"), 12);
   EXPECT_EQ(merged.integers("/findings/seed").size(), 1);
-  EXPECT_EQ(test::run_python(tools + "merge_fuzz.py'" + quoted_a + quoted_a + " --out '" +
-                             all.string() + "' 2>/dev/null"),
-            2);
+  EXPECT_EQ(test::run_python({tools + "merge_fuzz.py", a.string(), a.string(), "--out", all.string()}, true), 2);
 }
 
 }  // namespace

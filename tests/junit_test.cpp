@@ -123,9 +123,7 @@ failure = case.find("failure")
 assert failure.get("message").startswith("density / den\"sity', particle 17: value 0.0031 kg/m^3")
 assert "]]> & <!-- \ufffd ρ \ufffd\n" in failure.text, failure.text
 )");
-  EXPECT_EQ(test::run_python("'" + (folder / "read.py").string() + "' '" +
-                             (folder / "junit.xml").string() + "'"),
-            0);
+  EXPECT_EQ(test::run_python({(folder / "read.py").string(), (folder / "junit.xml").string()}), 0);
 }
 
 }  // namespace

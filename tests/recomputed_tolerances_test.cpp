@@ -11,8 +11,6 @@
 namespace decant {
 namespace {
 
-std::string in_quotes(const std::filesystem::path& path) { return " '" + path.string() + "'"; }
-
 /// What the script says of the tolerances in a report in which every value is wrong, so that all are kept.
 int status_of(const Fixture& fixture) {
   const test::TemporaryFolder folder;
@@ -30,8 +28,8 @@ int status_of(const Fixture& fixture) {
   Report report;
   report.rows = judge(backend, fixture, oracle, {"fields"});
   write_report(file, report);
-  return test::run_python(DECANT_SOURCE_DIR "/tests/recompute_tolerances.py" + in_quotes(inputs) +
-                          in_quotes(file));
+  return test::run_python(
+      {DECANT_SOURCE_DIR "/tests/recompute_tolerances.py", inputs.string(), file.string()});
 }
 
 class RecomputedTolerances : public testing::Test {

@@ -73,8 +73,7 @@ class ReportPage : public testing::Test {
       GTEST_SKIP() << "no matplotlib in " << test::python() << "; ci/setup makes it";
   }
   int run() {
-    return test::run_python("'" DECANT_SOURCE_DIR "/tools/report_html.py' '" +
-                            (folder_ / "report.h5").string() + "'");
+    return test::run_python({DECANT_SOURCE_DIR "/tools/report_html.py", (folder_ / "report.h5").string()});
   }
   std::string page() {
     std::ifstream in(folder_ / "report.html");

@@ -14,7 +14,7 @@ namespace {
 
 /// Exit status of tools/check_schema.py on a file; its output goes to the test's.
 int checked(const std::filesystem::path& file) {
-  return test::run_python("'" DECANT_SOURCE_DIR "/tools/check_schema.py' '" + file.string() + "'");
+  return test::run_python({DECANT_SOURCE_DIR "/tools/check_schema.py", file.string()});
 }
 
 class Schema : public FixtureFile {
