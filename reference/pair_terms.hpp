@@ -56,7 +56,7 @@ Vector3<Real> viscous_term(Real viscosity, Real mass, Real density_i, Real densi
   return viscosity / density_i * (mass / density_j) * L * (v_j - v_i);
 }
 
-/// (mu_w/rho_i) V_b (v_b − v_i) L, m/s². Source: Akinci et al. 2012, eq. 11–12.
+/// (mu_w/rho_i) V_b (v_b − v_i) L, m/s². Source: the viscous term above with m/rho_j → V_b.
 template <class Real>
 Vector3<Real> wall_viscous_term(Real wall_viscosity, Real boundary_volume, Real density_i,
                                 const Vector3<Real>& v_i, const Vector3<Real>& v_b, Real L) {

@@ -256,7 +256,7 @@ class Checks {
             std::to_string(substeps),
             ">= " + to_text(std::ceil(frame / bound)) +
                 ": dt = " + to_text(rounded(scene_.time_step())) + " s passes " +
-                (bound < cfl_bound ? "the viscous limit 0.125 h² rho0 / mu = "
+                (bound < cfl_bound ? "the viscous limit 0.125 h² rho0 / max(mu, mu_w / 2) = "
                                    : "the CFL limit 0.4 h / (c0 + v_max) = ") +
                 to_text(rounded(bound)) + " s");
   }

@@ -241,7 +241,7 @@ const Unsound unsound[] = {
     {"SubstepBeyondCflHoweverCourantAsks", pour, [](Scene& s) { s.schedule.courant = 0.5; },
      "time.courant", "0.5", "(0, 0.4]"},
     {"SubstepBeyondTheViscousLimit", pour, [](Scene& s) { s.fluid.viscosity = 20; },
-     "time.substeps_per_frame", "27", "the viscous limit 0.125 h² rho0 / mu"},
+     "time.substeps_per_frame", "27", "the viscous limit 0.125 h² rho0 / max(mu, mu_w / 2)"},
     {"NoSubsteps", pour, [](Scene& s) { s.schedule.substeps_per_frame = 0; },
      "time.substeps_per_frame", "0", "at least 1"},
     {"GravityAlongAPeriodWithoutASpeed", channel, [](Scene& s) { s.schedule.max_speed.reset(); },

@@ -47,7 +47,7 @@ constexpr const char* footer =
     "\n"
     "Examples:\n"
     "  decant bench --backend brute,hash,list --executor cuda --json build/bench.json\n"
-    "  decant bench fixtures/pour-4k-stream.h5 --backend hash,hash:pairs=rescan,list:skin=0.1";
+    "  decant bench pour-4k-stream --backend hash,hash:pairs=rescan,list:skin=0.1";
 
 // Seconds that a window takes, about, where --substeps leaves it open.
 constexpr double usual_window = 0.1;
@@ -206,7 +206,8 @@ int bench(BenchArguments& arguments) {
   for (const auto& name : names)
     backends.push_back(choose_backend(arguments.flags.applied_to(name), arguments.executor));
   arguments.flags.require_used();
-  std::vector<std::filesystem::path> files(arguments.fixtures.begin(), arguments.fixtures.end());
+  std::vector<std::filesystem::path> files;
+  for (const auto& given : arguments.fixtures) files.push_back(recording_called(given));
   if (files.empty()) files = fixtures_in(fixture_folder(), false);
 
   std::vector<BenchRow> rows;

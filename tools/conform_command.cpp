@@ -35,7 +35,7 @@ struct ConformArguments {
   std::string executor = "auto", report, junit, surroundings, explain;
   std::string results, oracle, name;
   int look_every = 0;
-  bool all = false, json = false, quiet = false;
+  bool all = false, list = false, json = false, quiet = false;
 };
 
 // Of what a report shows around its first failing particle, in H.
@@ -104,7 +104,8 @@ std::vector<Candidate> candidates_of(ConformArguments& arguments) {
 
 /// All are read before the first is judged: a bad one is refused before any work.
 std::vector<Fixture> fixtures_of(const ConformArguments& arguments) {
-  std::vector<std::filesystem::path> files(arguments.fixtures.begin(), arguments.fixtures.end());
+  std::vector<std::filesystem::path> files;
+  for (const auto& given : arguments.fixtures) files.push_back(recording_called(given));
   if (!files.empty() && arguments.all)
     throw InputError("command line", "--all", "given", "either --all or FIXTURE");
   if (files.empty()) files = fixtures_in(fixture_folder(), arguments.all);
@@ -242,6 +243,15 @@ std::string json_text(const Report& report, const std::vector<Replay>& replays,
   return all.dump(2);
 }
 
+/// Names of all recordings, those of study scale marked.
+int list_recordings() {
+  const auto small = fixtures_in(fixture_folder(), false);
+  for (const auto& file : fixtures_in(fixture_folder(), true))
+    fmt::print("{}{}\n", file.stem().string(),
+               std::find(small.begin(), small.end(), file) == small.end() ? "  (with --all)" : "");
+  return exit_pass;
+}
+
 /// What a check compares, its bound and where that comes from, in lines a terminal holds.
 int explain(const std::string& name) {
   const auto chosen = parse_checks({name});
@@ -282,6 +292,8 @@ int hand_over(const ConformArguments& arguments, const Report& report,
   std::fflush(stdout);
   // After the table: what was found out is not lost with a full disk.
   if (!arguments.report.empty()) write_report(arguments.report, report);
+  if (!arguments.report.empty() && !arguments.json && !arguments.quiet)
+    fmt::print("\nreport: {} (a page of it: tools/report_html.py)\n", arguments.report);
   if (!arguments.junit.empty()) write_text_file(arguments.junit, junit_xml(report));
   return status;
 }
@@ -304,6 +316,7 @@ int conform_results(const ConformArguments& arguments) {
 
 int conform(ConformArguments& arguments) {
   if (!arguments.explain.empty()) return explain(arguments.explain);
+  if (arguments.list) return list_recordings();
   if (!arguments.results.empty() || !arguments.oracle.empty() || !arguments.name.empty())
     return conform_results(arguments);
   const CheckSelection checks =
@@ -350,8 +363,9 @@ void add_conform_command(CLI::App& app, int& exit_status) {
   auto arguments = std::make_shared<ConformArguments>();
   CLI::App* verb = app.add_subcommand("conform", "judge backends on recorded states");
   verb->footer(footer);
-  verb->add_option("FIXTURE", arguments->fixtures, "recordings (*.h5); default: the small ones");
+  verb->add_option("FIXTURE", arguments->fixtures, "recordings, by file or by name; default: the small ones");
   verb->add_flag("--all", arguments->all, "the study-scale recordings too");
+  verb->add_flag("--list", arguments->list, "print the names of all recordings; judges nothing");
   verb->add_option("--backend", arguments->backends, "brute,…; default: all under test")
       ->delimiter(',')
       ->allow_extra_args(false);

@@ -46,7 +46,7 @@ constexpr const char* footer =
     "  expected        by theory, from the first state alone, just before a rebuild\n"
     "  first, proved   substeps after a rebuild until a pair is missed, and for which displacements\n"
     "                  prove that none is (two largest of the fluid, or of fluid and wall <= skin)\n"
-    "  density, accel. RMS error over RMS field, the largest; wall's: the wall's terms alone\n"
+    "  density, accel.  RMS error over RMS field, the largest; wall's: the wall's terms alone\n"
     "  deviation       of positions after the fixture's ensemble length, over the ensemble's own\n"
     "  us              a substep by the backend, rebuilds included\n"
     "`auto` rebuilds before a pair can be missed: the point to beat. Safe intervals: measured, proved by\n"
@@ -148,7 +148,7 @@ void run(DriftArguments& arguments, int& exit_status) {
   check(arguments);
   if (!arguments.series.empty()) {
     const DriftResult result =
-        measure_series(read_fixture(arguments.inputs.front()), arguments.series);
+        measure_series(read_fixture(recording_called(arguments.inputs.front())), arguments.series);
     fmt::print("{}", drift_table({result}));
     if (!arguments.report.empty())
       write_drift(arguments.report, {result}, {}, {"series", "", "given", "unknown", "unknown"});
@@ -169,7 +169,7 @@ void run(DriftArguments& arguments, int& exit_status) {
       scenes.push_back(load_scene(file));
       continue;
     }
-    states.push_back(read_fixture(file));
+    states.push_back(read_fixture(recording_called(file)));
     if (states.back().state.size() == 0)
       throw InputError(file, "/state/position", "no particles", "a state with fluid");
   }

@@ -2,6 +2,7 @@
 /// `decant export`: what a solver in another language needs to compute a fixture's fields.
 #include "oracle/port_inputs.hpp"
 #include "tools/commands.hpp"
+#include "tools/fixture_folder.hpp"
 #include "tools/output_place.hpp"
 
 #include <fmt/format.h>
@@ -27,7 +28,7 @@ constexpr const char* footer =
 
 int export_inputs(const ExportArguments& arguments) {
   check_output_place("--out", arguments.out);
-  const Fixture fixture = read_fixture(arguments.fixture);
+  const Fixture fixture = read_fixture(recording_called(arguments.fixture));
   const auto oracle = std::make_unique<const Judgement>(prepare(fixture, {}));
   write_port_inputs(arguments.out, fixture, *oracle);
   fmt::print("{}: {} particles, {} wall particles of {}\n", arguments.out, fixture.state.size(),

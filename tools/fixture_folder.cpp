@@ -65,4 +65,15 @@ std::vector<fs::path> fixtures_in(const fs::path& folder, bool all) {
   return files;
 }
 
+fs::path recording_called(const std::string& given) {
+  if (given.empty() || given.find('/') != std::string::npos || fs::exists(given)) return given;
+  try {
+    const fs::path folder = fixture_folder();
+    for (const fs::path& file : {folder / given, folder / (given + ".h5")})
+      if (fs::is_regular_file(file)) return file;
+  } catch (const InputError&) {  // no such folder: reading the file says so
+  }
+  return given;
+}
+
 }  // namespace decant

@@ -45,7 +45,7 @@ std::string footer() {
          "Examples:\n"
          "  decant fuzz --cases 1000\n"
          "  decant fuzz --backend hash --seconds 600 --seed 100001 --report build/fuzz.h5\n"
-         "  decant fuzz --backend list:trigger=local --property lists,substep --cases 10000\n"
+         "  decant fuzz --backend list:trigger=local --property lists --cases 10000\n"
          "  decant fuzz --seed 1067584 --write";
 }
 

@@ -4,14 +4,19 @@
 #include "reference/error.hpp"
 #include "tools/backend_choice.hpp"
 #include "tools/commands.hpp"
+#include "tools/help_text.hpp"
 #include "tools/wait_policy.hpp"
 #include "version.hpp"
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <memory>
+#include <string>
+#include <vector>
 
 namespace {
 
@@ -38,8 +43,17 @@ int main(int argc, char** argv) {
   using namespace decant;
   let_waiting_threads_sleep(argv);
   int status = exit_pass;
+  std::vector<std::string> arguments(argv + 1, argv + argc);
+  // As other programs have it.
+  if (!arguments.empty() && arguments.front() == "version") arguments.front() = "--version";
+  if (!arguments.empty() && arguments.front() == "help") {
+    arguments.erase(arguments.begin());
+    arguments.resize(std::min<std::size_t>(arguments.size(), 1));
+    arguments.push_back("--help");
+  }
   CLI::App app{"Judges GPU ports of an SPH fluid solver against a sequential oracle.", "decant"};
-  app.set_version_flag("--version", std::string("decant ") + version);
+  app.formatter(std::make_shared<HelpText>());
+  app.set_version_flag("-V,--version", std::string("decant ") + version);
   app.require_subcommand(1);
   app.footer(footer);
   add_pour_command(app, status);
@@ -52,13 +66,17 @@ int main(int argc, char** argv) {
   add_drift_command(app, status);
   add_validate_command(app, status);
   add_info_command(app, status);
+  if (arguments.empty()) {
+    fmt::print(stderr, "{}", app.help());
+    return exit_bad_input;
+  }
   try {
-    app.parse(argc, argv);
+    app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
     return status;
   } catch (const CLI::Success& help_or_version) {
     return app.exit(help_or_version);
   } catch (const CLI::ParseError& error) {
-    return complain(exit_bad_input, fmt::format("{} (decant --help)", error.what()).c_str());
+    return complain(exit_bad_input, explained(app, error, arguments).c_str());
   } catch (const InputError& error) {
     return complain(exit_bad_input, error.what());
   } catch (const DeviceAbsent& error) {

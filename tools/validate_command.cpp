@@ -42,8 +42,9 @@ constexpr const char* footer =
     "Examples:\n"
     "  decant validate --list\n"
     "  decant validate --quick --backend hash --executor host\n"
-    "  decant validate dam-front slow-pour --backend list --report build/validation.h5\n"
-    "  build/venv/bin/python tools/validation_page.py build/validation.h5 --out build/validation";
+    "  decant validate dam-front --backend list --report build/validation.h5\n"
+    "  build/venv/bin/python tools/validation_page.py build/validation.h5 \\\n"
+    "    --out build/validation";
 
 std::vector<const ValidationCase*> chosen_cases(const std::vector<std::string>& names) {
   std::vector<const ValidationCase*> chosen;
