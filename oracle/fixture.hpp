@@ -1,6 +1,6 @@
 /// \file
 /// A recorded state with the oracle's answer to it: what every backend is judged on. The file's
-/// layout is in fixture-format.md.
+/// layout is in formats/fixture.md.
 #pragma once
 
 #include "oracle/ensemble.hpp"
@@ -66,7 +66,7 @@ void write_fixture(const std::filesystem::path& file, const Fixture& fixture);
 void reduce_to_sample(Fixture& fixture, Eigen::Index count = 1024);
 
 /// Hexadecimal SHA-256 over all fields rounded to fp32, integers as int64, in the order of
-/// fixture-format.md. Equal digests mean equal fields; unequal ones may also come from another
+/// formats/fixture.md. Equal digests mean equal fields; unequal ones may also come from another
 /// compiler's last bits, then the sample decides.
 std::string digest_of(const Fields& fields);
 

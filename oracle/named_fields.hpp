@@ -1,7 +1,7 @@
 /// \file
 /// A port of any solver against that solver's own double-precision reference: fields of any name,
 /// on states of theirs. Tolerances come from the reference's file alone, so that a port cannot
-/// widen its own. The files' layout is in results-format.md.
+/// widen its own. The files' layout is in formats/results.md.
 ///
 ///   tau = (√n + c) (u + 2⁻⁵³) C + a + r · RMS
 ///

@@ -1,7 +1,7 @@
 /// \file
 /// Everything that a solver in another language needs to compute a fixture's fields: the state, the
 /// constants, the walls as they stand and move, and the inputs of the staged accelerations. The
-/// file's layout is in results-format.md.
+/// file's layout is in formats/results.md.
 #pragma once
 
 #include "oracle/conform.hpp"

@@ -1,7 +1,7 @@
 /// \file
 /// What a conformance run leaves behind: flat columns under /summary, the arrays behind each
 /// failing check, where it all came from; and the console table. The file's layout is in
-/// report-format.md.
+/// formats/report.md.
 #pragma once
 
 #include "oracle/backend.hpp"

@@ -1,7 +1,7 @@
 /// \file
 /// Results computed elsewhere, in any language, judged without linking: of one of our fixtures, or
 /// of states with a reference of their own (named_fields.hpp). The files' layout is in
-/// results-format.md.
+/// formats/results.md.
 #pragma once
 
 #include "oracle/conform.hpp"

@@ -3,7 +3,7 @@
 
     check_schema.py FILE.h5 …
 
-Reads the table in oracle/fixture-format.md, or that of reports, results, validations, drift or fuzzing,
+Reads the table in oracle/formats/fixture.md, or that of reports, results, validations, drift or fuzzing,
 and compares names, dtypes, shapes and units with what stands in the file. Exit status: 0 as documented, 1 not,
 2 bad input.
 """
@@ -16,7 +16,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-FORMATS = Path(__file__).resolve().parent.parent / "oracle"
+FORMATS = Path(__file__).resolve().parent.parent / "oracle" / "formats"
 
 
 def rows_of(document):
@@ -189,21 +189,21 @@ def complaints_about(path):
     with file:
         check = Checker(file)
         if "decant_fixture" in file.attrs:
-            check_fixture(check, rows_of(FORMATS / "fixture-format.md"))
+            check_fixture(check, rows_of(FORMATS / "fixture.md"))
         elif "decant_validation" in file.attrs:
-            check_validation(check, rows_of(FORMATS / "validation-format.md"))
+            check_validation(check, rows_of(FORMATS / "validation.md"))
         elif "decant_drift" in file.attrs:
-            check_columns(check, rows_of(FORMATS / "drift-format.md"))
+            check_columns(check, rows_of(FORMATS / "drift.md"))
         elif "decant_fuzz" in file.attrs:
-            check_columns(check, rows_of(FORMATS / "fuzz-format.md"))
+            check_columns(check, rows_of(FORMATS / "fuzz.md"))
         elif "decant_report" in file.attrs:
-            check_report(check, rows_of(FORMATS / "report-format.md"))
+            check_report(check, rows_of(FORMATS / "report.md"))
         else:
             kinds = [k for k in ("inputs", "results", "reference") if f"decant_{k}" in file.attrs]
             if not kinds:
                 print(f"{path}: nothing that has a schema document", file=sys.stderr)
                 raise SystemExit(2)
-            check_parts(check, rows_of(FORMATS / "results-format.md"), kinds[0])
+            check_parts(check, rows_of(FORMATS / "results.md"), kinds[0])
         return check.complaints
 
 

@@ -377,7 +377,7 @@ void add_conform_command(CLI::App& app, int& exit_status) {
                    "say what a check compares and why its bound is what it is; judges nothing");
   arguments->flags.add_to(*verb);
   verb->add_option("--results", arguments->results,
-                   "judge this file's fields (oracle/results-format.md) instead of a backend");
+                   "judge this file's fields (oracle/formats/results.md) instead of a backend");
   verb->add_option("--oracle", arguments->oracle,
                    "their own reference, for --results of their own states");
   verb->add_option("--name", arguments->name, "what the report calls --results; default: its file");

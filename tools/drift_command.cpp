@@ -250,7 +250,7 @@ void add_drift_command(CLI::App& app, int& exit_status) {
   verb.add_option("--looks", arguments->looks, "moments of a scene at which lists are looked at")
       ->capture_default_str();
   verb.add_option("--series", arguments->series,
-                  "HDF5 with another program's states and lists (oracle/list-series-format.md)");
+                  "HDF5 with another program's states and lists (oracle/formats/list-series.md)");
   verb.add_flag("--whole", arguments->whole, "of a scene: pours it whole with every list");
   verb.add_flag("--untimed", arguments->untimed, "lists are compared, not run");
   verb.add_flag("--quiet", arguments->quiet, "no progress on standard error");

@@ -19,7 +19,7 @@ struct ExportArguments {
 
 constexpr const char* footer =
     "Writes the state, the scene's constants, wall particles as they stand and move, and inputs of\n"
-    "the staged accelerations; the layout is in oracle/results-format.md.\n"
+    "the staged accelerations; the layout is in oracle/formats/results.md.\n"
     "\n"
     "Example:\n"
     "  decant export fixtures/pour-4k-stream.h5 --out inputs.h5\n"

@@ -146,7 +146,7 @@ void add_fuzz_command(CLI::App& app, int& exit_status) {
   verb.add_option("--threads", arguments->threads, "problems at a time; 0: as many as there are cores")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
-  verb.add_option("--report", arguments->report, "HDF5 file (oracle/fuzz-format.md)");
+  verb.add_option("--report", arguments->report, "HDF5 file (oracle/formats/fuzz.md)");
   verb.add_option("--failures", arguments->failures, "folder for what fails")->capture_default_str();
   verb.add_option("--most-findings", arguments->most_findings, "findings after which to stop")
       ->check(CLI::Range(1, 10000))

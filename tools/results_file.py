@@ -3,7 +3,7 @@
 
     results_file.py ANY.h5 --out FILE.h5     the same content in the format that is read
 
-The layouts are in oracle/results-format.md. As a module: write_results, write_reference, pair_sums.
+The layouts are in oracle/formats/results.md. As a module: write_results, write_reference, pair_sums.
 """
 
 import argparse
@@ -86,7 +86,7 @@ def write_results(path, fields=None, staged=None, substep=None, *, states=None, 
 
 def field(values, unit=None, *, condition=None, terms=None, precision=None, c=None,
           tolerance=None, relative=None):
-    """One field of a reference file: see oracle/results-format.md for what bounds it."""
+    """One field of a reference file: see oracle/formats/results.md for what bounds it."""
     return dict(values=values, unit=unit, condition=condition, terms=terms, precision=precision,
                 c=c, tolerance=tolerance, relative=relative)
 

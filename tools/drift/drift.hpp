@@ -164,7 +164,7 @@ void whole_pours(const Scene& scene, const DriftPlan& plan, int disturbed, const
                  const DoPart& do_part, std::vector<WholePour>& pours);
 
 /// A run by another program: states, and the list that it used at each. Layout in
-/// oracle/list-series-format.md. Throws InputError.
+/// oracle/formats/list-series.md. Throws InputError.
 DriftResult measure_series(const Fixture& fixture, const std::filesystem::path& series);
 
 /// The cheapest list whose acceleration stays within half of `tolerance` (relative RMS) at every substep of
@@ -182,7 +182,7 @@ std::unique_ptr<Recommendation> recommend(const std::vector<DriftResult>& result
 std::string drift_table(const std::vector<DriftResult>& results);
 std::string pour_table(const std::vector<PourDrift>& pours);
 
-/// Layout in oracle/drift-format.md. \param interrupted  how far the work came; empty: it is complete
+/// Layout in oracle/formats/drift.md. \param interrupted  how far the work came; empty: it is complete
 void write_drift(const std::filesystem::path& file, const std::vector<DriftResult>& results,
                  const std::vector<PourDrift>& pours, const BackendInfo& backend,
                  const std::string& interrupted = {});

@@ -130,7 +130,7 @@ std::string write_finding(const std::filesystem::path& folder, const Finding& fi
 /// Table for people.
 std::string campaign_table(const Campaign& campaign);
 
-/// Layout in oracle/fuzz-format.md.
+/// Layout in oracle/formats/fuzz.md.
 void write_campaign(const std::filesystem::path& file, const Campaign& campaign,
                     const BackendInfo& backend);
 

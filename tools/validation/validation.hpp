@@ -116,7 +116,8 @@ std::vector<ObservedOrder> observed_orders(const std::vector<ValidationResult>& 
 /// Case, quantity, reference, result, error, allowance, verdict.
 std::string validation_table(const std::vector<ValidationResult>& results);
 
-/// Everything that was found, with curves; layout in oracle/validation-format.md. Appears whole or not at all.
+/// Everything that was found, with curves; layout in oracle/formats/validation.md. Appears whole or not at
+/// all.
 /// \param interrupted  how far the work came; empty: it is complete
 void write_validation(const std::filesystem::path& file,
                       const std::vector<ValidationResult>& results,
