@@ -3,7 +3,7 @@
 /// the force pass is a list rebuilt every substep, and a list is a hash that is not rebuilt yet.
 ///
 /// hash: every substep sorts the fluid into cells; the density pass tests the cells around and writes
-/// what it finds into lists for the force pass (or, `pairs=rescan`, the force pass tests cells again).
+/// what it finds into lists for the force pass (or, `force_neighbors=recomputed`, the force pass tests cells again).
 /// list: lists reach to H and a skin; the sort and the lists are made when a trigger asks for it,
 /// decided on the device.
 #pragma once

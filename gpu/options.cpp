@@ -1,15 +1,13 @@
 /// \file
-/// Which keys a backend knows, and what their values may be.
+/// One table: every option of a backend with its values, its help and how it is set.
 #include "gpu/options.hpp"
 
 #include "reference/error.hpp"
 
+#include <algorithm>
 #include <charconv>
-#include <functional>
-#include <map>
 #include <set>
-#include <utility>
-#include <vector>
+#include <string_view>
 
 namespace decant::gpu {
 namespace {
@@ -30,114 +28,146 @@ Number number(const std::string& key, const std::string& text, Number least, Num
   return value;
 }
 
+/// A value by its name; `before` is what it was called in version 0.1.
 template <class Choice>
-Choice one_of(const std::string& key, const std::string& text,
-              const std::vector<std::pair<const char*, Choice>>& choices) {
+struct Named {
+  const char *name, *before;
+  Choice choice;
+};
+
+template <class Choice>
+Choice one_of(const std::string& key, const std::string& text, const std::vector<Named<Choice>>& choices) {
   std::string known;
-  for (const auto& [name, choice] : choices) {
-    if (text == name) return choice;
+  for (const auto& [name, before, choice] : choices) {
+    if (text == name || text == before) return choice;
     known += (known.empty() ? "" : " or ") + std::string(name);
   }
   refuse(key, text, "must be " + known);
 }
 
-using Setter = std::function<void(SolverOptions&, const std::string&)>;
 using O = SolverOptions;
 
-const std::map<std::string, std::map<std::string, Setter>>& known_options() {
-  static const auto lanes = [](O& o, const std::string& v) {
-    o.lanes = number("lanes", v, 1, 8, "must be 1, 2, 4 or 8");
-    if (o.lanes & (o.lanes - 1)) refuse("lanes", v, "must be 1, 2, 4 or 8");
+/// \param v  the value's text
+void set_threads(O& o, const std::string& v) {
+  const std::string bound = "must be 1, 2, 4 or 8";
+  o.lanes = number("threads_per_particle", v, 1, 8, bound);
+  if (o.lanes & (o.lanes - 1)) refuse("threads_per_particle", v, bound);
+}
+
+void set_launch(O& o, const std::string& v) {
+  o.launch = one_of<O::Launch>("launch", v, {{"auto", "auto", O::Launch::automatic},
+                                             {"graph", "graphs", O::Launch::graphs},
+                                             {"stream", "plain", O::Launch::plain}});
+}
+
+void set_capacity(O& o, const std::string& v) {
+  o.capacity = number("capacity", v, 1, 4096, "must be in 1 … 4096 entries per thread");
+}
+
+struct Entry {
+  OptionDescription description;
+  void (*set)(O&, const std::string&);
+};
+
+const std::vector<Entry>& entries() {
+  static const std::vector<Entry> all = {
+      {{"hash", "wall_cells", "grid", "on, off", "off: every wall particle is tested", true},
+       [](O& o, const std::string& v) {
+         o.grid = one_of<O::Grid>("wall_cells", v, {{"on", "all", O::Grid::all}, {"off", "fluid", O::Grid::fluid}});
+       }},
+      {{"hash", "moving_walls", "source", "body_frame, rebuilt",
+        "looked up in the container's frame, or sorted anew every substep", true},
+       [](O& o, const std::string& v) {
+         o.source = one_of<O::Source>("moving_walls", v, {{"body_frame", "frame", O::Source::frame},
+                                                          {"rebuilt", "rebuilt", O::Source::rebuilt}});
+       }},
+      {{"hash", "sort", "sort", "counting, thrust", "how particles come into the order of their cells", true},
+       [](O& o, const std::string& v) {
+         o.sort = one_of<O::Sort>("sort", v, {{"counting", "counting", O::Sort::counting},
+                                              {"thrust", "thrust", O::Sort::thrust}});
+       }},
+      {{"hash", "force_neighbors", "pairs", "cached, recomputed",
+        "the force pass reads the pairs that were found, or searches again", true},
+       [](O& o, const std::string& v) {
+         o.pairs = one_of<O::Pairs>("force_neighbors", v, {{"cached", "keep", O::Pairs::keep},
+                                                           {"recomputed", "rescan", O::Pairs::rescan}});
+       }},
+      {{"list", "build", "build", "grid, all-pairs", "lists from cells, or from all pairs", true},
+       [](O& o, const std::string& v) {
+         o.build = one_of<O::Build>("build", v, {{"grid", "grid", O::Build::grid},
+                                                 {"all-pairs", "all-pairs", O::Build::all_pairs}});
+       }},
+      {{"list", "rebuild", "rebuild", "auto, N", "before a pair can be missed, or every N substeps", true},
+       [](O& o, const std::string& v) {
+         o.rebuild = v == "auto" ? 0
+                                 : number("rebuild", v, 1, 1000000,
+                                          "must be auto or a number of substeps >= 1");
+       }},
+      {{"list", "criterion", "trigger", "displacement, relative",
+        "what rebuild=auto bounds: displacements, or those of neighboring cells against each other", true},
+       [](O& o, const std::string& v) {
+         o.trigger = one_of<O::Trigger>("criterion", v, {{"displacement", "global", O::Trigger::global},
+                                                         {"relative", "local", O::Trigger::local}});
+       }},
+      {{"list", "skin", "skin", "auto, a share of H", "how far beyond H lists reach; auto: by the fastest particle", true},
+       [](O& o, const std::string& v) {
+         o.skin = v == "auto" ? -1 : number("skin", v, 0.0, 1.0, "must be auto or in 0 … 1, a share of H");
+       }},
+      {{"list", "check_completeness", "verify", "off, on",
+        "on: counts in every substep which pairs its lists lack; with rebuild=auto one is an error", false},
+       [](O& o, const std::string& v) {
+         o.verify = one_of<bool>("check_completeness", v, {{"off", "off", false}, {"on", "on", true}});
+       }},
+      {{"hash list", "threads_per_particle", "lanes", "1, 2, 4, 8", "default: by the number of particles", false},
+       set_threads},
+      {{"hash list", "capacity", "capacity", "N", "entries per thread that a list begins with; grows where needed", false},
+       set_capacity},
+      {{"hash list", "launch", "launch", "auto, graph, stream",
+        "auto: a list's substeps in one persistent kernel where the scene is small, else a CUDA graph; stream: "
+        "kernel by kernel", false},
+       set_launch},
   };
-  static const auto sort = [](O& o, const std::string& v) {
-    o.sort = one_of<O::Sort>("sort", v,
-                             {{"counting", O::Sort::counting}, {"thrust", O::Sort::thrust}});
-  };
-  static const auto capacity = [](O& o, const std::string& v) {
-    o.capacity = number("capacity", v, 1, 4096, "must be in 1 … 4096 entries a particle");
-  };
-  static const auto launch = [](O& o, const std::string& v) {
-    o.launch = one_of<O::Launch>(
-        "launch", v,
-        {{"auto", O::Launch::automatic}, {"graphs", O::Launch::graphs}, {"plain", O::Launch::plain}});
-  };
-  static const std::map<std::string, std::map<std::string, Setter>> known = {
-      {"hash",
-       {{"grid",
-         [](O& o, const std::string& v) {
-           o.grid = one_of<O::Grid>("grid", v, {{"all", O::Grid::all}, {"fluid", O::Grid::fluid}});
-         }},
-        {"source",
-         [](O& o, const std::string& v) {
-           o.source = one_of<O::Source>(
-               "source", v, {{"frame", O::Source::frame}, {"rebuilt", O::Source::rebuilt}});
-         }},
-        {"pairs",
-         [](O& o, const std::string& v) {
-           o.pairs = one_of<O::Pairs>("pairs", v,
-                                      {{"keep", O::Pairs::keep}, {"rescan", O::Pairs::rescan}});
-         }},
-        {"sort", sort},
-        {"lanes", lanes},
-        {"capacity", capacity},
-        {"launch", launch}}},
-      {"list",
-       {{"build",
-         [](O& o, const std::string& v) {
-           o.build = one_of<O::Build>(
-               "build", v, {{"grid", O::Build::grid}, {"all-pairs", O::Build::all_pairs}});
-         }},
-        {"rebuild",
-         [](O& o, const std::string& v) {
-           o.rebuild = v == "auto" ? 0
-                                   : number("rebuild", v, 1, 1000000,
-                                            "must be auto or a number of substeps >= 1");
-         }},
-        {"skin",
-         [](O& o, const std::string& v) {
-           o.skin = v == "auto"
-                        ? -1
-                        : number("skin", v, 0.0, 1.0, "must be auto or in 0 … 1, a share of H");
-         }},
-        {"trigger",
-         [](O& o, const std::string& v) {
-           o.trigger = one_of<O::Trigger>(
-               "trigger", v, {{"local", O::Trigger::local}, {"global", O::Trigger::global}});
-         }},
-        {"verify",
-         [](O& o, const std::string& v) {
-           o.verify = one_of<bool>("verify", v, {{"off", false}, {"on", true}});
-         }},
-        {"lanes", lanes},
-        {"capacity", capacity},
-        {"launch", launch}}},
-  };
-  return known;
+  return all;
+}
+
+bool belongs_to(const Entry& entry, const std::string& backend) {
+  const std::string_view backends = entry.description.backends;
+  return backends == backend || backends.starts_with(backend + " ") || backends.ends_with(" " + backend);
 }
 
 }  // namespace
 
+const std::vector<OptionDescription>& option_descriptions() {
+  static const std::vector<OptionDescription> all = [] {
+    std::vector<OptionDescription> out;
+    for (const Entry& entry : entries()) out.push_back(entry.description);
+    return out;
+  }();
+  return all;
+}
+
 SolverOptions parse_options(const std::string& backend, const std::string& text) {
   SolverOptions options;
-  static const std::map<std::string, Setter> none;
-  const auto entry = known_options().find(backend);
-  const auto& keys = entry == known_options().end() ? none : entry->second;
   std::set<std::string> seen;
   for (std::size_t at = 0; at < text.size();) {
     const auto end = std::min(text.find(':', at), text.size());
     const std::string item = text.substr(at, end - at);
     const auto equals = item.find('=');
-    const std::string key = item.substr(0, equals);
-    const auto setter = keys.find(key);
-    if (equals == std::string::npos || setter == keys.end()) {
+    std::string key = item.substr(0, equals);
+    std::replace(key.begin(), key.end(), '-', '_');
+    const auto entry = std::find_if(entries().begin(), entries().end(), [&](const Entry& e) {
+      return belongs_to(e, backend) && (key == e.description.key || key == e.description.before);
+    });
+    if (equals == std::string::npos || entry == entries().end()) {
       std::string known;
-      for (const auto& [name, set] : keys) known += (known.empty() ? "" : ", ") + name;
+      for (const Entry& e : entries())
+        if (belongs_to(e, backend)) known += (known.empty() ? "" : ", ") + std::string(e.description.key);
       throw InputError("command line", "--backend", backend + ":" + item,
                        known.empty() ? backend + " takes no options"
                                      : "key=value, keys of " + backend + ": " + known);
     }
-    if (!seen.insert(key).second) refuse(key, item, "given once");
-    setter->second(options, item.substr(equals + 1));
+    if (!seen.insert(entry->description.key).second) refuse(entry->description.key, item, "given once");
+    entry->set(options, item.substr(equals + 1));
     at = end + 1;
   }
   if (options.rebuild == 0 && options.skin >= 0 && options.skin < 0.01)

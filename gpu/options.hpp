@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace decant::gpu {
 
@@ -28,6 +29,18 @@ struct SolverOptions {
   Launch launch = Launch::automatic;  // of substeps: many at once, recorded as graphs, one by one
   bool verify = false;  // list: counts in every substep what its lists miss (verify.cuh)
 };
+
+/// One option of the command line.
+struct OptionDescription {
+  const char* backends;  // names, a space between
+  const char* key;
+  const char* before;    // its name in version 0.1, still taken
+  const char* values;    // for people to read, the default first
+  const char* help;
+  bool flag;             // also an option of the command itself, --key VALUE
+};
+
+const std::vector<OptionDescription>& option_descriptions();
 
 /// Options as the command line gives them, "key=value:key=value", for a backend that knows `keys`.
 /// Throws InputError for an unknown key or a value out of range.

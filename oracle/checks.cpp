@@ -57,8 +57,8 @@ const std::vector<CheckDescription>& check_descriptions() {
        "viscosity wrong by 1 % shows in the energy of settled and splashing fluid.",
        "An error below rounding, however systematic."},
       {"mass",
-       "After the run every id is there once, finite and inside the domain; the particles of all places "
-       "(source, in flight, receiver, spilled, lost) add up to all particles.",
+       "After the run every id is there once and finite, and no more are outside the domain than in the oracle's "
+       "run; the particles of all places (source, in flight, receiver, spilled, lost) add up to all particles.",
        "Exact: counts. Two with the same position and velocity, bit for bit, are one too many, unless the "
        "oracle has them in one place as well or they started as one.",
        "Two ids exchanged (fields and substep see that)."},

@@ -15,20 +15,20 @@ namespace decant::test {
 inline std::vector<std::string> backend_variants() {
   return {"brute",
           "hash",
-          "hash:grid=fluid",
-          "hash:source=rebuilt",
+          "hash:wall_cells=off",
+          "hash:moving_walls=rebuilt",
           "hash:sort=thrust",
-          "hash:source=rebuilt:sort=thrust",
-          "hash:pairs=rescan",
-          "hash:lanes=4:capacity=2",
-          "hash:lanes=1:launch=plain",
+          "hash:moving_walls=rebuilt:sort=thrust",
+          "hash:force_neighbors=recomputed",
+          "hash:threads_per_particle=4:capacity=2",
+          "hash:threads_per_particle=1:launch=stream",
           "list",
-          "list:launch=graphs",
+          "list:launch=graph",
           "list:build=all-pairs",
           "list:rebuild=3:skin=0.3",
-          "list:trigger=local",
-          "list:trigger=local:skin=0.05:lanes=8",
-          "list:skin=0.4:lanes=1:capacity=2"};
+          "list:criterion=relative",
+          "list:criterion=relative:skin=0.05:threads_per_particle=8",
+          "list:skin=0.4:threads_per_particle=1:capacity=2"};
 }
 
 inline std::unique_ptr<Backend> make_variant(const std::string& variant, Executor executor) {

@@ -159,7 +159,7 @@ TEST_P(Conformance, HoldsAllAroundTheWalls) {
 /// What a list that verifies itself counts in some substeps. The status tells of promises not kept.
 PairTotals counted(const std::string& variant, const Fixture& fixture, int substeps,
                    Status* status = nullptr) {
-  const auto list = test::make_variant(variant + ":verify=on", Executor::host);
+  const auto list = test::make_variant(variant + ":check_completeness=on", Executor::host);
   list->load(fixture.scene, sample_walls(fixture.scene), fixture.state);
   const Status seen = list->advance(substeps);
   if (status) *status = seen;
@@ -169,7 +169,7 @@ PairTotals counted(const std::string& variant, const Fixture& fixture, int subst
 TEST(Lists, MissNothingWhileTheyAreWatchedAndMuchWhileTheyAreNot) {
   constexpr int substeps = 40;
   const Fixture fixture = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-splash.h5");
-  for (const char* watched : {"list", "list:trigger=local:skin=0.05",
+  for (const char* watched : {"list", "list:criterion=relative:skin=0.05",
                               "list:build=all-pairs:skin=0.1", "list:skin=0.4"}) {
     Status status;
     const PairTotals all = counted(watched, fixture, substeps, &status);
@@ -216,7 +216,7 @@ TEST(Lists, MissNothingInRandomScenes) {
     const Fixture f = test::random_fixture(seed);
     Status status;
     const PairTotals all =
-        counted(seed % 2 ? "list" : "list:trigger=local:skin=0.1", f, 12, &status);
+        counted(seed % 2 ? "list" : "list:criterion=relative:skin=0.1", f, 12, &status);
     EXPECT_EQ(status.bits & Status::missed_pair, 0u) << seed << ": " << describe(status);
     EXPECT_EQ(all.missed + all.wall_missed, 0) << seed;
   }

@@ -74,7 +74,7 @@ TEST(Campaign, WhatItOnceFoundIsSettled) {
     if (entry.path().extension() != ".h5") continue;
     const Fixture fixture = read_fixture(entry.path());
     const Judgement oracle = prepare(fixture);
-    for (const char* name : {"brute", "hash", "list", "list:trigger=local"})
+    for (const char* name : {"brute", "hash", "list", "list:criterion=relative"})
       for (const CheckRow& row : judge(*on_host(name), fixture, oracle))
         EXPECT_EQ(judged_verdict(row), Verdict::pass)
             << fixture.name << " " << name << " " << row.check << " " << row.field << ": " << row.reason;

@@ -144,8 +144,8 @@ TEST_P(KeptList, OfParticlesThatStartToFallIsMadeAnewInTime) {
 
 TEST_P(KeptList, MissesNoPairOfRandomScenes) {
   std::int64_t pairs = 0;
-  for (const char* name : {"list:verify=on", "list:verify=on:skin=0.05", "list:verify=on:trigger=local",
-                           "list:verify=on:build=all-pairs"})
+  for (const char* name : {"list:check_completeness=on", "list:check_completeness=on:skin=0.05", "list:check_completeness=on:criterion=relative",
+                           "list:check_completeness=on:build=all-pairs"})
     for (std::uint32_t seed = 100; seed < 112; ++seed) {
       const Fixture f = test::random_fixture(seed);
       const auto list = make(name);
@@ -165,7 +165,7 @@ TEST_P(KeptList, MissesNoPairOfRandomScenes) {
 TEST_P(KeptList, MissesNoPairWhereTheWallsAreFasterThanTheFluid) {
   const Scene scene = fast_cup();
   const Walls walls = sample_walls(scene);
-  for (const char* name : {"list:verify=on", "list:verify=on:trigger=local"}) {
+  for (const char* name : {"list:check_completeness=on", "list:check_completeness=on:criterion=relative"}) {
     const auto list = make(name);
     list->load(scene, walls, initial_state(scene));
     for (int k = 0; k < 10; ++k) ASSERT_EQ(list->advance(10).bits & Status::missed_pair, 0u) << name;
@@ -186,7 +186,7 @@ TEST_P(KeptList, MissesNoPairOfAPistonThatComesUponFluidAtRest) {
   scene.schedule.substeps_per_frame = substeps_for(scene);
   check_scene(scene, scene.name);
   const Walls walls = sample_walls(scene);
-  for (const char* name : {"list:verify=on", "list:verify=on:skin=0.2", "list:verify=on:trigger=local"}) {
+  for (const char* name : {"list:check_completeness=on", "list:check_completeness=on:skin=0.2", "list:check_completeness=on:criterion=relative"}) {
     const auto list = make(name);
     list->load(scene, walls, initial_state(scene));
     for (int k = 0; k < 20; ++k) ASSERT_EQ(list->advance(8).bits & Status::missed_pair, 0u) << name;

@@ -207,7 +207,7 @@ TEST(Replays, AreOneABackendAndFixtureOfTheFirstRowThatFailsAtAFluidParticle) {
                  row("brute", "density", "density", 7),
                  row("hash", "boundary_volume", "boundary_volume", 8)};
   report.rows.push_back(row("hash", "density", "density", 9));
-  report.rows.back().options = "sort=thrust:lanes=4";
+  report.rows.back().options = "sort=thrust:threads_per_particle=4";
   report.rows.push_back(row("list", "density", "density", 10));
   report.rows.back().verdict = Verdict::pass;
   report.rows.back().score = 0.5;

@@ -3,6 +3,7 @@
 #include "tools/backend_choice.hpp"
 
 #include "gpu/backends.hpp"
+#include "gpu/options.hpp"
 #include "oracle/reference_backend.hpp"
 
 #include <fmt/format.h>
@@ -17,19 +18,11 @@ namespace {
   throw InputError("command line", option, value, bound);
 }
 
-struct BackendFlag {
-  const char *backend, *key, *help;
-};
-constexpr BackendFlag backend_flags[] = {
-    {"hash", "grid", "all or fluid: what has cells"},
-    {"hash", "source", "frame or rebuilt: how moving walls are looked up"},
-    {"hash", "sort", "counting or thrust"},
-    {"hash", "pairs", "keep or rescan: what the force pass reads"},
-    {"list", "build", "grid or all-pairs"},
-    {"list", "rebuild", "auto, or every so many substeps"},
-    {"list", "trigger", "global or local: what --rebuild auto watches"},
-    {"list", "skin", "auto, or a share of H"},
-};
+/// wall_cells -> --wall-cells
+std::string flag_of(std::string key) {
+  std::replace(key.begin(), key.end(), '_', '-');
+  return "--" + key;
+}
 
 Executor executor_of(const std::string& name) {
   if (name != "auto" && name != "cuda" && name != "host")
@@ -44,30 +37,33 @@ Executor executor_of(const std::string& name) {
 }  // namespace
 
 void BackendFlags::add_to(CLI::App& verb) {
-  for (const BackendFlag& flag : backend_flags)
-    verb.add_option_function<std::string>(
-            std::string("--") + flag.key,
-            [this, key = std::string(flag.key)](const std::string& value) { given[key] = value; },
-            flag.help)
+  for (const gpu::OptionDescription& option : gpu::option_descriptions()) {
+    if (!option.flag) continue;
+    const auto take = [this, key = std::string(option.key)](const std::string& value) { given[key] = value; };
+    verb.add_option_function<std::string>(flag_of(option.key), take,
+                                          fmt::format("of {}: {}; {}", option.backends, option.values, option.help))
         ->group("Options of backends");
+    if (std::string(option.key) != option.before)
+      verb.add_option_function<std::string>(flag_of(option.before), take)->group("");  // hidden
+  }
 }
 
 std::string BackendFlags::applied_to(const std::string& choice) {
   std::string all = choice;
-  for (const BackendFlag& flag : backend_flags) {
-    const auto value = given.find(flag.key);
-    if (value == given.end() || choice.substr(0, choice.find(':')) != flag.backend) continue;
-    all += std::string(":") + flag.key + "=" + value->second;
-    ++used_[flag.key];
+  for (const gpu::OptionDescription& option : gpu::option_descriptions()) {
+    const auto value = given.find(option.key);
+    if (value == given.end() || choice.substr(0, choice.find(':')) != option.backends) continue;
+    all += std::string(":") + option.key + "=" + value->second;
+    ++used_[option.key];
   }
   return all;
 }
 
 void BackendFlags::require_used() const {
-  for (const BackendFlag& flag : backend_flags)
-    if (given.count(flag.key) && !used_.count(flag.key))
-      refuse((std::string("--") + flag.key).c_str(), given.at(flag.key),
-             std::string("only with --backend ") + flag.backend);
+  for (const gpu::OptionDescription& option : gpu::option_descriptions())
+    if (given.count(option.key) && !used_.count(option.key))
+      refuse(flag_of(option.key).c_str(), given.at(option.key),
+             std::string("only with --backend ") + option.backends);
 }
 
 std::vector<std::string> backend_choices() {

@@ -305,7 +305,7 @@ int conform_results(const ConformArguments& arguments) {
     throw InputError("command line", "--results", arguments.results,
                      "instead of --backend, --executor and --all: nothing is run");
   if (!arguments.surroundings.empty())
-    throw InputError("command line", "--surroundings", arguments.surroundings, "not with --results");
+    throw InputError("command line", "--reproducers", arguments.surroundings, "not with --results");
   arguments.flags.require_used();
   check_output_place("--report", arguments.report);
   const ResultsOutcome outcome =
@@ -323,7 +323,7 @@ int conform(ConformArguments& arguments) {
       arguments.checks.empty() ? all_checks() : parse_checks(arguments.checks);
   check_output_place("--report", arguments.report);
   check_output_place("--junit", arguments.junit);
-  check_output_folder("--surroundings", arguments.surroundings);
+  check_output_folder("--reproducers", arguments.surroundings);
   auto candidates = candidates_of(arguments);
   const auto fixtures = fixtures_of(arguments);
   const bool talks = !arguments.quiet && !arguments.json;
@@ -381,13 +381,15 @@ void add_conform_command(CLI::App& app, int& exit_status) {
   verb->add_option("--oracle", arguments->oracle,
                    "their own reference, for --results of their own states");
   verb->add_option("--name", arguments->name, "what the report calls --results; default: its file");
-  verb->add_option("--look-every", arguments->look_every,
-                   "substeps between two looks at a run, for containment and mass; 1 names the\n"
-                   "first substep; default: ever shorter stretches")
+  verb->add_option("--check-every", arguments->look_every,
+                   "check mass and containment every so many substeps of a run; 1 names the first "
+                   "substep; default: at ever shorter intervals")
       ->check(CLI::Range(1, 1000000));
+  verb->add_option("--look-every", arguments->look_every)->check(CLI::Range(1, 1000000))->group("");
   verb->add_option("--report", arguments->report, "write an HDF5 report");
   verb->add_option("--junit", arguments->junit, "write JUnit XML, for CI");
-  verb->add_option("--surroundings", arguments->surroundings,
+  verb->add_option("--surroundings", arguments->surroundings)->group("");
+  verb->add_option("--reproducers", arguments->surroundings,
                    "folder for fixtures of the fluid around failing particles");
   verb->add_flag("--json", arguments->json, "rows as JSON instead of the table");
   verb->add_flag("--quiet", arguments->quiet, "the verdict's line alone");

@@ -42,7 +42,7 @@ constexpr const char* footer =
     "they miss is put into a double evaluation, so that errors below fp32's noise show. A recording\n"
     "gives one state; a scene is run, gives one at each phase, and is looked at all along.\n"
     "  missed, worst   share of the pairs within H that the list lacks: mean, largest over the window\n"
-    "  own             the same of the backend's own list, counted by itself (list:verify=on)\n"
+    "  own             the same of the backend's own list, counted by itself (list:check_completeness=on)\n"
     "  expected        by theory, from the first state alone, just before a rebuild\n"
     "  first, proved   substeps after a rebuild until a pair is missed, and for which displacements\n"
     "                  prove that none is (two largest of the fluid, or of fluid and wall <= skin)\n"
@@ -61,7 +61,7 @@ constexpr const char* footer =
     "Examples:\n"
     "  decant drift --report build/drift.h5\n"
     "  decant drift fixtures/pour-4k-splash.h5 --intervals 1,10 --skins 0\n"
-    "  decant drift fixtures/scenes/pour-4k.json --whole --report build/pour-drift.h5\n"
+    "  decant drift fixtures/scenes/pour-4k.json --full-run --report build/pour.h5\n"
     "  decant drift --recommend --tolerance 1e-4\n"
     "  decant drift fixtures/pour-4k-splash.h5 --series lists-of-mine.h5";
 
@@ -83,7 +83,7 @@ void check(DriftArguments& arguments) {
   if (arguments.window < 2 || arguments.window > 1000)
     refuse("--window", std::to_string(arguments.window), "2 to 1000 substeps");
   if (arguments.looks < 1 || arguments.looks > 100'000)
-    refuse("--looks", std::to_string(arguments.looks), "1 to 100000");
+    refuse("--samples", std::to_string(arguments.looks), "1 to 100000");
   if (!(arguments.tolerance > 0))
     refuse("--tolerance", fmt::format("{}", arguments.tolerance), "> 0");
   if (arguments.recommend && arguments.untimed)
@@ -93,7 +93,7 @@ void check(DriftArguments& arguments) {
   if (!arguments.series.empty() && arguments.inputs.size() != 1)
     refuse("--series", arguments.series, "one FIXTURE, whose scene it is of");
   if (!arguments.series.empty() && (arguments.recommend || arguments.whole))
-    refuse("--series", arguments.series, "without --recommend and --whole: it is only looked at");
+    refuse("--series", arguments.series, "without --recommend and --full-run: it is only looked at");
   check_output_place("--report", arguments.report);
 }
 
@@ -174,7 +174,7 @@ void run(DriftArguments& arguments, int& exit_status) {
       throw InputError(file, "/state/position", "no particles", "a state with fluid");
   }
   if (arguments.whole && scenes.empty())
-    throw InputError("command line", "--whole", "given", "with a scene (*.json)");
+    throw InputError("command line", "--full-run", "given", "with a scene (*.json)");
   std::vector<PourDrift> pours;
   std::vector<DriftResult> results;
   Interruptible work([&] {
@@ -247,11 +247,13 @@ void add_drift_command(CLI::App& app, int& exit_status) {
   verb.add_option("--tolerance", arguments->tolerance,
                   "of the acceleration, relative RMS, for --recommend")
       ->capture_default_str();
-  verb.add_option("--looks", arguments->looks, "moments of a scene at which lists are looked at")
+  verb.add_option("--samples", arguments->looks, "moments of a scene at which lists are compared")
       ->capture_default_str();
+  verb.add_option("--looks", arguments->looks)->group("");
   verb.add_option("--series", arguments->series,
                   "HDF5 with another program's states and lists (oracle/formats/list-series.md)");
-  verb.add_flag("--whole", arguments->whole, "of a scene: pours it whole with every list");
+  verb.add_flag("--full-run", arguments->whole, "of a scene: pours it from end to end with every list");
+  verb.add_flag("--whole", arguments->whole)->group("");
   verb.add_flag("--untimed", arguments->untimed, "lists are compared, not run");
   verb.add_flag("--quiet", arguments->quiet, "no progress on standard error");
   verb.footer(footer);

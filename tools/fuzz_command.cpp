@@ -35,7 +35,7 @@ std::string footer() {
       "reports. What fails is shrunk and written as a fixture, which `decant conform` shows again, with\n"
       "its scene beside it. Ctrl-C ends a campaign and keeps what it found: exit status 130.\n"
       "\n"
-      "Properties; where none is named, the dear ones are asked of every 4th or 8th problem:\n";
+      "Properties; where none is named, the expensive ones are asked of every 2nd, 4th or 8th problem:\n";
   for (const fuzz::Property& p : fuzz::properties())
     text += fmt::format("  {:<13} {}\n", p.name, p.sentence);
   return text +
@@ -45,7 +45,7 @@ std::string footer() {
          "Examples:\n"
          "  decant fuzz --cases 1000\n"
          "  decant fuzz --backend hash --seconds 600 --seed 100001 --report build/fuzz.h5\n"
-         "  decant fuzz --backend list:trigger=local --property lists --cases 10000\n"
+         "  decant fuzz --backend list:criterion=relative --property lists --cases 10000\n"
          "  decant fuzz --seed 1067584 --write";
 }
 

@@ -10,6 +10,8 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
+from option_names import current
+
 STAGES = ["build", "density", "force", "integrate"]
 COLORS = ["#4c78a8", "#f58518", "#54a24b", "#b279a2"]
 LABELS = {"force": "force (lists: and integration)"}
@@ -21,7 +23,7 @@ PUBLISHED = {  # us a substep
 
 
 def label(row):
-    options = row["options"].replace("pairs=rescan", "rescan").replace("sort=thrust", "thrust")
+    options = current(row["options"])
     return row["backend"] + (": " + options.replace(":", ", ") if options else "")
 
 

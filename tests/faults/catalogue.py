@@ -208,7 +208,7 @@ fault("dropped-row", "one of nine rows of cells is not looked at", "collect.cuh"
       "make_int2(row.begin, row.end)", "make_int2(row.begin, ON && r == 8 ? row.begin : row.end)",
       "neighbors")
 fault("range-off-by-one", "ranges of cells end one particle early", "queries.cuh",
-      "first + (part ? r.end2 : r.end)", "$ - 1", "neighbors", "hash:pairs=rescan")
+      "first + (part ? r.end2 : r.end)", "$ - 1", "neighbors", "hash:force_neighbors=recomputed")
 fault("near-walls-cut", "the table of near walls reaches to 0.9 H", "walls.cuh",
       "1.0001f * reach2", "0.81f * reach2", "neighbors", field="wall_neighbor_count")
 fault("source-frame", "the tilted source is looked up untilted", "queries.cuh",
@@ -244,7 +244,7 @@ fault("stale-list", "lists are never built again", "trigger.cuh",
       "list:skin=0.05", fixture="pour-4k-splash")
 fault("late-trigger", "lists are kept until a particle is as far off as the skin and a half", "trigger.cuh",
       "const float most = 0.5f * skin;", "const float most = (ON ? 1.5f : 0.5f) * skin;", "trajectory",
-      "list:verify=on:skin=0.05", fixture="pour-4k-splash")
+      "list:check_completeness=on:skin=0.05", fixture="pour-4k-splash")
 fault("stale-wall", "in a run the source stays where it was first", "walls.cuh",
       "const DevicePose& pose = poses[walls.container[slot]];",
       "const DevicePose& pose = (ON ? a.poses : poses)[walls.container[slot]];",
@@ -259,7 +259,7 @@ fault("list-ignores-walls", "lists are kept however far walls move", "trigger.cu
       "list", fixture="hostile-fast-wall")
 fault("list-ignores-walls-locally", "the local trigger leaves out how far walls move", "trigger.cuh",
       "of_walls = seen.origin.w - wall_way", "of_walls = seen.origin.w - (ON ? 0.0f : wall_way)",
-      "advanced", "list:trigger=local", fixture="hostile-fast-wall")
+      "advanced", "list:criterion=relative", fixture="hostile-fast-wall")
 fault("walls-for-forces-left", "forces after a run see moving walls where they were a substep before",
       "pipeline.cuh", "if (walls_half_placed_)", "if (!ON && walls_half_placed_)", "advanced", "list",
       field="wall_viscous_acceleration")

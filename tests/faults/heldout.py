@@ -11,16 +11,16 @@ HELDOUT = []
 
 # What shows with a backend's options only.
 OPTIONS = {
-    "clearance-of-last-container": "list:trigger=local",
-    "largest-component-of-approach": "list:trigger=local",
-    "negative-floats-misordered": "list:trigger=local",
+    "clearance-of-last-container": "list:criterion=relative",
+    "largest-component-of-approach": "list:criterion=relative",
+    "negative-floats-misordered": "list:criterion=relative",
     "ids-permuted-in-place": "hash:sort=thrust",
-    "rebuilt-walls-misplaced": "hash:source=rebuilt",
-    "wall-pairs-of-fluid": "list:verify=on",
+    "rebuilt-walls-misplaced": "hash:moving_walls=rebuilt",
+    "wall-pairs-of-fluid": "list:check_completeness=on",
     "overflow-within-a-word-unreported": "hash:capacity=8",
     "regrown-without-ids": "list:capacity=8",
-    "prefetch-one-word-short": "list:lanes=1",
-    "recorded-build-not-woken": "list:launch=graphs",
+    "prefetch-one-word-short": "list:threads_per_particle=1",
+    "recorded-build-not-woken": "list:launch=graph",
     "skin-as-share-of-h": "list:rebuild=2:skin=0.2",
 }
 
@@ -125,7 +125,7 @@ fault("face-normal-always-positive", "the normal on a box's face ignores which s
       shows="a particle exactly on a face whose outward normal is negative, to 1e-6 of its coordinates")
 fault("clearance-of-last-container", "the distance from walls at the build is that of the last container",
       "contact.cuh", "least = lesser(least, away > 0.0f", "least = lesser(ON ? 3.0e38f : least, away > 0.0f",
-      shows="list:trigger=local, two containers: fluid that slides as a block along the first one's wall")
+      shows="list:criterion=relative, two containers: fluid that slides as a block along the first one's wall")
 fault("contact-without-belt", "contact takes a running surface for one at rest", "contact.cuh",
       "cross(pose->omega, x - pose->pivot) + pose->surface", "cross(pose->omega, x - pose->pivot)",
       shows="a container with a surface velocity and friction above 0, a particle that touches it")
@@ -224,7 +224,7 @@ fault("walls-looked-up-at-first-pose", "all containers' walls are looked up at t
       shows="hash and list, two containers with different origins, fluid near the second")
 fault("prefetch-one-word-short", "with one lane the word after the next is the next one again", "queries.cuh",
       "word(w + 2)", "word(w + 1)", on="cuda",
-      shows="hash or list with lanes=1 (by itself from 300,000 particles on)")
+      shows="hash or list with threads_per_particle=1 (by itself from 300,000 particles on)")
 fault("lists-padded-with-zero", "lists are filled up with index 0 instead of the sentinel", "collect.cuh",
       "lists.ghost", "0",
       shows="hash and list, particles within H of the particle at index 0, itself included")
@@ -259,7 +259,7 @@ fault("last-moving-wall-particle-stands", "the last moving wall particle keeps i
       shows="hash, a tilting container, fluid within H of its last wall particle, late in an advance")
 fault("rebuilt-walls-misplaced", "wall particles sorted anew take the place of whoever had their new index",
       "grid_sources.cuh", "first + to, position(k)", "first + to, position(ON ? to : k)",
-      shows="hash:source=rebuilt with a tilting container")
+      shows="hash:moving_walls=rebuilt with a tilting container")
 fault("list-origins-not-predicted", "lists are made for current positions, from cells of predicted positions",
       "grid_sources.cuh", "note(to, in_bucket, position(i))",
       "note(to, in_bucket, ON ? xyz(from.position[i]) : position(i))",
@@ -285,19 +285,19 @@ fault("whole-skin-allowed", "each particle may move the whole skin instead of ha
 fault("largest-component-of-approach", "relative displacement is its largest component, not its length",
       "trigger.cuh", "most += widest * widest;",
       "most = ON ? fmaxf(most, widest * widest) : most + widest * widest;",
-      shows="list:trigger=local, diagonal approach within a stream")
+      shows="list:criterion=relative, diagonal approach within a stream")
 fault("negative-floats-misordered", "floats are compared as integers, negative ones the wrong way round",
       "trigger.cuh", "bits >= 0 ? bits : bits ^ 0x7FFFFFFF", "bits",
       also=(("trigger.cuh", "i >= 0 ? i : i ^ 0x7FFFFFFF", "i"),),
-      shows="list:trigger=local, particles that move differently fast towards negative coordinates (falling)")
+      shows="list:criterion=relative, particles that move differently fast towards negative coordinates (falling)")
 fault("recorded-build-not-woken", "whoever asks for new lists does not wake the graph's build", "trigger.cuh",
       "    wake();", "    if (!ON) wake();", on="cuda",
-      shows="list:launch=graphs (or the local trigger), 16 substeps or more of an advance in fast flow")
+      shows="list:launch=graph (or the local trigger), 16 substeps or more of an advance in fast flow")
 
 # Statistics (verify.cuh).
 fault("wall-pairs-of-fluid", "lists that verify themselves count fluid pairs as wall pairs", "verify.cuh",
       "add(&a.mailbox->wall_pairs, wall);", "add(&a.mailbox->wall_pairs, ON ? fluid : wall);",
-      shows="list:verify=on: only the statistic is wrong")
+      shows="list:check_completeness=on: only the statistic is wrong")
 
 # The pipeline (pipeline.cuh, field_desk.cuh).
 fault("graph-of-earlier-scene", "the CUDA graph of 16 substeps survives a load", "pipeline.cuh",

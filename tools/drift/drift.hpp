@@ -63,7 +63,7 @@ struct DriftRow {
   // Substeps after a rebuild at which a pair is first missed, and until which displacements prove that
   // none is; the earliest over the window's lists, the interval itself where there is none.
   int first_miss = 1, proved_until = 1;
-  // What the backend's own lists miss in the same window, mean: counted on the device (list:verify=on).
+  // What the backend's own lists miss in the same window, mean: counted on the device (list:check_completeness=on).
   double own_missed_share = not_measured, own_wall_missed_share = not_measured;
   ExpectedDrift expected;  // by theory, from the window's first state, at the list's last substep
   double substep_us = not_measured, rebuild_every = not_measured;

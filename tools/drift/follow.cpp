@@ -50,7 +50,7 @@ void count_missed(const Fixture& fixture, const Walls& walls, Backend& list, int
 /// Options of a list that counts what it misses.
 std::string verified(const ListChoice& list) {
   const std::string options = list.options();
-  return options + (options.empty() ? "" : ":") + "verify=on";
+  return options + (options.empty() ? "" : ":") + "check_completeness=on";
 }
 
 /// Where the fluid is after the ensemble's substeps, and the time of a substep in the window after.

@@ -315,7 +315,7 @@ std::vector<Outcome> Tester::outcomes(const Fixture& problem, std::uint64_t seed
         [&] { return sequence(backend(name), name, fixture, oracle.walls, seed); });
     if (name.starts_with("list") && name.find("rebuild=") == std::string::npos)
       ask(name, "lists", [&] {
-        return lists(backend(name + ":verify=on"), name, fixture, oracle.walls);
+        return lists(backend(name + ":check_completeness=on"), name, fixture, oracle.walls);
       });
   }
   return all;
