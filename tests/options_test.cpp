@@ -1,0 +1,69 @@
+/// \file
+/// Options of backends: each value by its name, by the name it had in version 0.1, and what is refused.
+#include "gpu/options.hpp"
+
+#include "reference/error.hpp"
+
+#include <gtest/gtest.h>
+
+namespace decant::gpu {
+namespace {
+
+bool same(const SolverOptions& a, const SolverOptions& b) {
+  return a.grid == b.grid && a.source == b.source && a.sort == b.sort && a.pairs == b.pairs && a.build == b.build &&
+         a.trigger == b.trigger && a.rebuild == b.rebuild && a.skin == b.skin && a.lanes == b.lanes &&
+         a.capacity == b.capacity && a.launch == b.launch && a.verify == b.verify;
+}
+
+TEST(BackendOptions, AreTakenByTheirEarlierNamesToo) {
+  const struct {
+    const char *backend, *now, *before;
+  } pairs[] = {
+      {"hash", "wall_cells=off", "grid=fluid"},
+      {"hash", "moving_walls=rebuilt", "source=rebuilt"},
+      {"hash", "force_neighbors=recomputed", "pairs=rescan"},
+      {"hash", "threads_per_particle=4:launch=stream", "lanes=4:launch=plain"},
+      {"list", "criterion=relative:check_completeness=on", "trigger=local:verify=on"},
+      {"list", "launch=graph:threads-per-particle=1", "launch=graphs:lanes=1"},
+  };
+  for (const auto& [backend, now, before] : pairs) {
+    EXPECT_TRUE(same(parse_options(backend, now), parse_options(backend, before))) << now;
+    EXPECT_FALSE(same(parse_options(backend, now), {})) << now;
+  }
+  const SolverOptions defaults = parse_options(
+      "hash", "wall_cells=on:moving_walls=body_frame:force_neighbors=cached:sort=counting:launch=auto");
+  EXPECT_TRUE(same(defaults, {}));
+}
+
+TEST(BackendOptions, AreRefusedByKeyValueAndBound) {
+  for (const char* wrong : {"wall_cells=maybe", "wall_cells=on:grid=all", "threads_per_particle=3", "skin=0.1", "colour=red",
+                            "capacity=0", "launch"})
+    EXPECT_THROW(parse_options("hash", wrong), InputError) << wrong;
+  try {
+    (void)parse_options("list", "criterion=global-local");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("displacement or relative"), std::string::npos) << error.what();
+  }
+}
+
+/// Help, flags and parser are of one table: each value it names is taken.
+TEST(BackendOptions, TakeEveryValueThatTheirHelpNames) {
+  for (const OptionDescription& option : option_descriptions()) {
+    std::string backend = option.backends;
+    backend = backend.substr(0, backend.find(' '));
+    std::string values = option.values;
+    for (std::size_t at = 0; at < values.size();) {
+      const std::size_t end = std::min(values.find(", ", at), values.size());
+      std::string value = values.substr(at, end - at);
+      at = end + 2;
+      if (value == "N") value = "7";
+      if (value == "a share of H") value = "0.2";
+      EXPECT_NO_THROW(parse_options(backend, std::string(option.key) + "=" + value)) << option.key << '=' << value;
+    }
+    EXPECT_GT(std::string(option.help).size(), 10) << option.key;
+  }
+}
+
+}  // namespace
+}  // namespace decant::gpu
