@@ -18,7 +18,7 @@ struct Said {
   std::string ended;  // "": well; "crash" or "hang" by a signal, "failed" otherwise
 };
 
-/// say(k), k < count, each in a process of its own, `jobs` at a time, each for so many seconds at most.
+/// say(k), k < count, each in a process of its own, `jobs` at a time, each for so many seconds of the processor at most.
 /// What throws has failed, and standard error tells why.
 std::vector<Said> in_processes(std::size_t count, int jobs, unsigned seconds,
                                const std::function<std::string(std::size_t)>& say);
