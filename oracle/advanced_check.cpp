@@ -49,8 +49,7 @@ View view(Backend& backend, Eigen::Index particles, Eigen::Index walls, std::int
 void judge_advanced(const std::vector<View>& views, const Fixture& fixture, const Walls& walls,
                     const WallAnswer& volumes, Sheet& sheet) {
   for (const View& v : views) {
-    if (const std::string why = objection(v.state, fixture, fixture.state.substep + v.substeps);
-        !why.empty())
+    if (const std::string why = objection(v.state, fixture, fixture.state.substep + v.substeps); !why.empty())
       return sheet.failed("advanced", why);
     if (!v.status.ok()) return sheet.failed("advanced", describe(v.status));
     judge_fields("advanced", fmt::format(" after {}", v.substeps), v.fields,

@@ -18,15 +18,13 @@ namespace {
 
 /// Whether the segment a–b enters the solid deeper than `depth`. The distance changes by at most the
 /// way walked, so most segments are settled by their ends.
-bool runs_deeper(const SolidDistance& solid, const Vec3& a, double at_a, const Vec3& b, double at_b,
-                 double depth) {
+bool runs_deeper(const SolidDistance& solid, const Vec3& a, double at_a, const Vec3& b, double at_b, double depth) {
   const double length = (b - a).norm();
   if (at_a < -depth || at_b < -depth) return true;
   if (0.5 * (at_a + at_b - length) >= -depth || length < 1e-9) return false;
   const Vec3 middle = 0.5 * (a + b);
   const double at_middle = solid.at(middle).distance;
-  return runs_deeper(solid, a, at_a, middle, at_middle, depth) ||
-         runs_deeper(solid, middle, at_middle, b, at_b, depth);
+  return runs_deeper(solid, a, at_a, middle, at_middle, depth) || runs_deeper(solid, middle, at_middle, b, at_b, depth);
 }
 
 bool outside(const Domain& domain, const Vec3& x) {
@@ -37,8 +35,7 @@ bool outside(const Domain& domain, const Vec3& x) {
 
 }  // namespace
 
-Audit::Audit(const Scene& scene)
-    : scene_(scene), solids_(scene.containers.begin(), scene.containers.end()) {}
+Audit::Audit(const Scene& scene) : scene_(scene), solids_(scene.containers.begin(), scene.containers.end()) {}
 
 AuditResult Audit::look(const ParticleState& state) {
   AuditResult result;
@@ -56,8 +53,7 @@ AuditResult Audit::look(const ParticleState& state) {
     result.kinetic_energy += 0.5 * mass * v.squaredNorm();
     result.potential_energy -= mass * scene_.gravity.dot(x);
     // NaN once seen stays.
-    if (!(v.norm() <= result.max_speed) && !std::isnan(result.max_speed))
-      result.max_speed = v.norm();
+    if (!(v.norm() <= result.max_speed) && !std::isnan(result.max_speed)) result.max_speed = v.norm();
   }
 
   bool source_seen = false;

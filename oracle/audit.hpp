@@ -16,16 +16,15 @@ namespace decant {
 
 /// Place of one particle. `source` is the first container that can move, `receiver` any other.
 enum class Place : std::uint8_t { source, in_flight, receiver, spilled, lost };
-inline constexpr std::array<const char*, 5> place_names = {"source", "in_flight", "receiver",
-                                                           "spilled", "lost"};
+inline constexpr std::array<const char*, 5> place_names = {"source", "in_flight", "receiver", "spilled", "lost"};
 
 struct AuditResult {
   std::array<std::int64_t, 5> particles_at{};  // by Place; adds up to N
   std::array<double, 5> mass_at{};             // kg
   double deepest = 0;                          // m, largest penetration depth at the positions
   std::int64_t deepest_particle = -1;
-  std::int64_t inside = 0;       // particles inside a solid
-  std::int64_t crossed = 0;      // particles whose path since the last look leads through a wall
+  std::int64_t inside = 0;   // particles inside a solid
+  std::int64_t crossed = 0;  // particles whose path since the last look leads through a wall
   std::int64_t first_crossed = -1;
   double kinetic_energy = 0, potential_energy = 0;  // J
   double max_speed = 0;                             // m/s

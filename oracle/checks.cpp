@@ -25,8 +25,7 @@ const std::vector<CheckDescription>& check_descriptions() {
        "Integers are exact, but for particles that own a pair too near H for fp32 to place; their "
        "number is bounded by four times what a fluid of this density has.",
        "A factor of 1 + 1e-5 on G, or on B and gamma where nothing is compressed by more than a percent."},
-      {"substep",
-       "Positions and velocities one substep on: integration, moving walls, contact.",
+      {"substep", "Positions and velocities one substep on: integration, moving walls, contact.",
        "tau_v = dt tau_a + 2u(|v| + dt|a|), tau_x = dt tau_v + u(2|x| + 4 dt|v|), and what contacts "
        "make of them (oracle/contact_bounds.hpp). Where fp32 cannot tell whether a particle touches, either "
        "answer may be given, each with its own narrow tolerance.",
@@ -72,10 +71,8 @@ const std::vector<CheckDescription>& check_descriptions() {
       {"determinism",
        "Two evaluations and two runs from the same state give the same bits, and the same numbers of rebuilds "
        "and, where lists verify themselves, of pairs.",
-       "Exact: the number of values that differ is 0.",
-       "A race that did not happen this time."},
-      {"conservation",
-       "The forces between fluid particles add up to nothing, pressure and viscosity apart: momentum.",
+       "Exact: the number of values that differ is 0.", "A race that did not happen this time."},
+      {"conservation", "The forces between fluid particles add up to nothing, pressure and viscosity apart: momentum.",
        "√Σ tau_i² of the particles' own tolerances: rounding errors of different particles are "
        "independent.",
        "A factor on all forces."},
@@ -105,8 +102,7 @@ CheckSelection all_checks() {
 CheckSelection parse_checks(const std::vector<std::string>& names) {
   const CheckSelection all = all_checks();
   std::string known;
-  for (const auto& check : check_descriptions())
-    known += (known.empty() ? "" : ", ") + std::string(check.name);
+  for (const auto& check : check_descriptions()) known += (known.empty() ? "" : ", ") + std::string(check.name);
   CheckSelection chosen;
   for (const auto& name : names) {
     if (!all.count(name)) throw InputError("command line", "--check", name, "one of " + known);

@@ -11,8 +11,8 @@ namespace decant {
 struct CheckDescription {
   const char* name;
   const char* compares;
-  const char* bound;   // and where it comes from
-  const char* blind;   // what this check cannot see
+  const char* bound;  // and where it comes from
+  const char* blind;  // what this check cannot see
 };
 
 /// In the order in which they are made: fields, substep, contact, advanced, trajectory, mass, containment,

@@ -59,8 +59,7 @@ void compare(const Values& v, CheckRow& row) {
       row.worst_component = v.components > 1 ? k % v.components : -1;
     }
     if (v.float_value.size())
-      float_worst = std::max(
-          float_worst, score_of(std::abs(v.float_value[k] - v.expected[k]), v.tolerance[k]));
+      float_worst = std::max(float_worst, score_of(std::abs(v.float_value[k] - v.expected[k]), v.tolerance[k]));
   }
   row.n = static_cast<std::int64_t>(scores.size());
   row.score = std::max(worst, 0.0);
@@ -78,8 +77,8 @@ void compare(const Values& v, CheckRow& row) {
   }
   if (v.excluded && !(row.excluded <= v.most_excluded)) {
     row.verdict = Verdict::fail;
-    row.reason = std::to_string(row.excluded) + " ambiguous particles, at most " +
-                 std::to_string(v.most_excluded) + " expected";
+    row.reason =
+        std::to_string(row.excluded) + " ambiguous particles, at most " + std::to_string(v.most_excluded) + " expected";
   }
 }
 

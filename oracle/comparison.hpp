@@ -3,8 +3,8 @@
 /// Every comparison is written so that NaN fails.
 #pragma once
 
-#include "oracle/report.hpp"
 #include "oracle/fixture.hpp"
+#include "oracle/report.hpp"
 
 #include <Eigen/Dense>
 
@@ -32,8 +32,7 @@ struct Values {
 /// Column by column.
 template <class Matrix>
 Eigen::VectorXd flat(const Matrix& m) {
-  return Eigen::Map<const Eigen::Matrix<typename Matrix::Scalar, Eigen::Dynamic, 1>>(m.data(),
-                                                                                     m.size())
+  return Eigen::Map<const Eigen::Matrix<typename Matrix::Scalar, Eigen::Dynamic, 1>>(m.data(), m.size())
       .template cast<double>();
 }
 

@@ -27,8 +27,7 @@ namespace {
 void run_fields(Backend& backend, const Judgement& oracle, Sheet& sheet) {
   const auto n = oracle.own.fields.density.size(), m = oracle.own.fields.boundary_volume.size();
   Fields got = Fields::unwritten(n, m);
-  if (const Status status = backend.evaluate(got); !status.ok())
-    return sheet.failed("evaluation", describe(status));
+  if (const Status status = backend.evaluate(got); !status.ok()) return sheet.failed("evaluation", describe(status));
   judge_stages(got, all_answered(), oracle, sheet);
   Fields staged = Fields::unwritten(n, m);
   if (const Status status = backend.evaluate(staged, &oracle.inputs); !status.ok())
@@ -41,8 +40,7 @@ void run_fields(Backend& backend, const Judgement& oracle, Sheet& sheet) {
 /// particle with a pair too near to H may have one more or less, and rarely two.
 void judge_verified(const PairTotals& counted, const OracleAnswer& own, Sheet& sheet) {
   if (counted.pairs == 0 && counted.wall_pairs == 0) return;
-  const auto row = [&](const char* field, std::int64_t got, const auto& neighbors,
-                       const std::vector<bool>& ambiguous) {
+  const auto row = [&](const char* field, std::int64_t got, const auto& neighbors, const std::vector<bool>& ambiguous) {
     const auto unsure = std::count(ambiguous.begin(), ambiguous.end(), true);
     compare(std::abs(static_cast<double>(got - neighbors.sum())), 2.0 * static_cast<double>(unsure),
             sheet.row("substep", field, "1"));
@@ -52,32 +50,27 @@ void judge_verified(const PairTotals& counted, const OracleAnswer& own, Sheet& s
 }
 
 void run_substep(Backend& backend, const Fixture& fixture, const Judgement& oracle, Sheet& sheet) {
-  if (const Status status = backend.advance(1); !status.ok())
-    return sheet.failed("substep", describe(status));
+  if (const Status status = backend.advance(1); !status.ok()) return sheet.failed("substep", describe(status));
   ParticleState got;
   backend.read(got);
   const auto n = fixture.state.size();
   if (got.position.cols() != n || got.velocity.cols() != n)
-    return sheet.failed("substep", fmt::format("{} positions and {} velocities, not {}",
-                                               got.position.cols(), got.velocity.cols(), n));
+    return sheet.failed(
+        "substep", fmt::format("{} positions and {} velocities, not {}", got.position.cols(), got.velocity.cols(), n));
   if (got.substep != fixture.state.substep + 1)
-    return sheet.failed("substep", fmt::format("is at substep {}, not {}", got.substep,
-                                               fixture.state.substep + 1));
+    return sheet.failed("substep", fmt::format("is at substep {}, not {}", got.substep, fixture.state.substep + 1));
   judge_substep(got, all_answered(), fixture, oracle, sheet);
   judge_verified(backend.neighbor_stats().verified, oracle.own, sheet);
 }
 
 /// Recorded against recomputed, both in double: only the last bits may differ between compilers. Tolerances
 /// are for a port of 2⁻²⁴ and an oracle of 2⁻⁵³; here both are of 2⁻⁵³.
-void require_reproduced(const Fixture& fixture, const std::string& name,
-                        const Eigen::VectorXd& recorded, const Eigen::VectorXd& today,
-                        const Eigen::VectorXd& tolerance) {
+void require_reproduced(const Fixture& fixture, const std::string& name, const Eigen::VectorXd& recorded,
+                        const Eigen::VectorXd& today, const Eigen::VectorXd& tolerance) {
   for (Eigen::Index k = 0; k < today.size(); ++k) {
-    const double bound =
-        2 * reference_roundoff / (unit_roundoff + reference_roundoff) * tolerance[k];
+    const double bound = 2 * reference_roundoff / (unit_roundoff + reference_roundoff) * tolerance[k];
     if (std::abs(recorded[k] - today[k]) <= bound) continue;
-    throw InputError(fixture.name, name + "[" + std::to_string(k) + "]",
-                     fmt::format("{:.17g}", recorded[k]),
+    throw InputError(fixture.name, name + "[" + std::to_string(k) + "]", fmt::format("{:.17g}", recorded[k]),
                      fmt::format("this build's reference gives {:.17g} ± {:.2g}; record the "
                                  "fixture anew if that is intended",
                                  today[k], bound));
@@ -92,16 +85,13 @@ void require_reproduced(const Fixture& fixture, const OracleAnswer& today) {
     const auto check = [&](const char* name, const auto& then, const auto& now, const auto& bound) {
       require_reproduced(fixture, name, flat(then), flat(now), flat(bound));
     };
-    check("boundary_volume", recorded.boundary_volume, today.fields.boundary_volume,
-          today.tolerance.boundary_volume);
+    check("boundary_volume", recorded.boundary_volume, today.fields.boundary_volume, today.tolerance.boundary_volume);
     check("density", recorded.density, today.fields.density, today.tolerance.density);
     check("pressure", recorded.pressure, today.fields.pressure, today.tolerance.pressure);
     for (const auto& field : acceleration_fields)
-      check(field.name, recorded.*field.member, today.fields.*field.member,
-            today.tolerance.*field.member);
+      check(field.name, recorded.*field.member, today.fields.*field.member, today.tolerance.*field.member);
     for (const auto& fact : neighbor_facts)
-      check("neighbors", recorded.*fact.member, today.fields.*fact.member,
-            today.tolerance.*fact.member);
+      check("neighbors", recorded.*fact.member, today.fields.*fact.member, today.tolerance.*fact.member);
     return;
   }
   const auto sampled = [&](const Eigen::VectorXd& all) {
@@ -110,19 +100,17 @@ void require_reproduced(const Fixture& fixture, const OracleAnswer& today) {
   const auto sampled3 = [&](const Eigen::Matrix3Xd& all) {
     return Eigen::Matrix3Xd(all(Eigen::all, fixture.sample_id.cast<Eigen::Index>()));
   };
-  require_reproduced(fixture, "sample density", fixture.sample_density,
-                     sampled(today.fields.density), sampled(today.tolerance.density));
-  require_reproduced(fixture, "sample pressure", fixture.sample_pressure,
-                     sampled(today.fields.pressure), sampled(today.tolerance.pressure));
+  require_reproduced(fixture, "sample density", fixture.sample_density, sampled(today.fields.density),
+                     sampled(today.tolerance.density));
+  require_reproduced(fixture, "sample pressure", fixture.sample_pressure, sampled(today.fields.pressure),
+                     sampled(today.tolerance.pressure));
   require_reproduced(fixture, "sample acceleration", flat(fixture.sample_acceleration),
-                     flat(sampled3(today.fields.acceleration)),
-                     flat(sampled3(today.tolerance.acceleration)));
+                     flat(sampled3(today.fields.acceleration)), flat(sampled3(today.tolerance.acceleration)));
 }
 
 }  // namespace
 
-std::string evaluate_oracle(const Scene& scene, const ParticleState& state, Fields& fields,
-                            ConditionSums& condition) {
+std::string evaluate_oracle(const Scene& scene, const ParticleState& state, Fields& fields, ConditionSums& condition) {
   OracleAnswer a = answer(scene, sample_walls(scene), state);
   std::string why = weakness(a);
   fields = std::move(a.fields);
@@ -131,13 +119,13 @@ std::string evaluate_oracle(const Scene& scene, const ParticleState& state, Fiel
 }
 
 std::string weakness(const OracleAnswer& a) {
-  const auto objection = [](const std::vector<bool>& ambiguous, std::int64_t most,
-                            const char* kind) {
+  const auto objection = [](const std::vector<bool>& ambiguous, std::int64_t most, const char* kind) {
     const auto count = std::count(ambiguous.begin(), ambiguous.end(), true);
     return count <= most ? std::string()
-                         : fmt::format("{} particles have {} neighbors too near H for fp32 to place, "
-                                       "at most {} expected; ",
-                                       count, kind, most);
+                         : fmt::format(
+                               "{} particles have {} neighbors too near H for fp32 to place, "
+                               "at most {} expected; ",
+                               count, kind, most);
   };
   const std::string why = objection(a.fluid_ambiguous, a.most_fluid_ambiguous, "fluid") +
                           objection(a.wall_ambiguous, a.most_wall_ambiguous, "wall");
@@ -194,8 +182,7 @@ Judgement prepare(const Fixture& fixture, const CheckSelection& checks, int look
   j.inputs.density = j.own.fields.density.cast<float>().cast<double>();
   j.inputs.pressure = j.own.fields.pressure.cast<float>().cast<double>();
   const auto wanted = [&](std::initializer_list<const char*> names) {
-    return std::any_of(names.begin(), names.end(),
-                       [&](const char* name) { return checks.count(name) > 0; });
+    return std::any_of(names.begin(), names.end(), [&](const char* name) { return checks.count(name) > 0; });
   };
   if (wanted({"fields", "conservation"})) {
     j.given = answer(scene, j.walls, volumes, fixture.state, &j.inputs);
@@ -203,8 +190,7 @@ Judgement prepare(const Fixture& fixture, const CheckSelection& checks, int look
   }
   if (wanted({"fields"})) j.own_float = float_fields(scene, j.walls, volumes, fixture.state);
   if (wanted({"substep"})) j.substep = substep_answer(scene, fixture.state, j.own);
-  if (wanted({"contact"}))
-    j.contact = contact_problems(scene, fixture.state, j.own.fields.acceleration);
+  if (wanted({"contact"})) j.contact = contact_problems(scene, fixture.state, j.own.fields.acceleration);
   const bool runs = wanted({"trajectory", "mass", "containment", "determinism"});
   if (runs || wanted({"advanced"})) j.stretches = stretches_of(fixture, look_every);
   if (runs) run_ahead(fixture, j);
@@ -231,8 +217,7 @@ std::vector<CheckRow> judge(Backend& backend, const Fixture& fixture, const Judg
     if (checks.count("substep")) run_substep(backend, fixture, oracle, *sheet);
     if (checks.count("contact")) judge_contact(backend, oracle.walls, oracle.contact, *sheet);
     judge_runs(backend, fixture, oracle, checks, *sheet);
-    if (checks.count("status"))
-      judge_status(backend, fixture.scene, fixture.state.substep, *sheet);
+    if (checks.count("status")) judge_status(backend, fixture.scene, fixture.state.substep, *sheet);
   } catch (const std::exception& error) {
     if (!sheet) sheet.emplace(BackendInfo{}, fixture.name);  // it cannot even say what it is
     sheet->failed("run", error.what());

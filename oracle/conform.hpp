@@ -36,9 +36,9 @@ struct Stretch {
 struct Judgement {
   Walls walls;
   WallAnswer volumes;
-  OracleAnswer own;     // every stage from the stage before
-  StageInputs inputs;   // the oracle's density and pressure, rounded to fp32
-  OracleAnswer given;   // accelerations from those inputs
+  OracleAnswer own;               // every stage from the stage before
+  StageInputs inputs;             // the oracle's density and pressure, rounded to fp32
+  OracleAnswer given;             // accelerations from those inputs
   Fields own_float, given_float;  // the same source in sequential fp32
   SubstepAnswer substep;
   std::vector<ContactProblem> contact;
@@ -55,8 +55,7 @@ struct Judgement {
 /// Fields and condition sums at one state, as a fixture records them. Returns why no backend can
 /// pass on that state, for people to read; empty for a sound one. A lattice has thousands of pairs
 /// at one distance, and where that is H nearly, fp32 cannot tell who is a neighbor.
-std::string evaluate_oracle(const Scene& scene, const ParticleState& state, Fields& fields,
-                            ConditionSums& condition);
+std::string evaluate_oracle(const Scene& scene, const ParticleState& state, Fields& fields, ConditionSums& condition);
 
 /// Why no backend can pass where this is the answer; empty for a sound one.
 std::string weakness(const OracleAnswer& answer);
@@ -66,8 +65,7 @@ std::string weakness(const OracleAnswer& answer);
 /// to 2⁻⁵³.
 /// \param look_every  substeps between two looks at a run, for containment and mass; 0: where it is viewed,
 ///                    after half of the rest, and so on
-Judgement prepare(const Fixture& fixture, const CheckSelection& checks = all_checks(),
-                  int look_every = 0);
+Judgement prepare(const Fixture& fixture, const CheckSelection& checks = all_checks(), int look_every = 0);
 
 /// Loads the fixture into the backend and compares; a backend that throws or reports trouble gives
 /// rows with verdict fail and the reason. Rows of the check `fields` carry the stage's name:

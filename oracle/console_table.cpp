@@ -26,8 +26,7 @@ bool worse(const CheckRow& a, const CheckRow& b) {
   const bool a_fails = judged_verdict(a) == Verdict::fail;
   if (a_fails != (judged_verdict(b) == Verdict::fail)) return a_fails;
   // NaN is the worst score there is.
-  if (std::isnan(a.score) || std::isnan(b.score))
-    return std::isnan(a.score) && !std::isnan(b.score);
+  if (std::isnan(a.score) || std::isnan(b.score)) return std::isnan(a.score) && !std::isnan(b.score);
   return a.score > b.score;
 }
 
@@ -40,23 +39,19 @@ std::vector<Line> lines_of(const std::vector<CheckRow>& rows) {
   std::vector<Line> lines;
   for (const CheckRow& row : rows) {
     const std::string backend = backend_label(row);
-    auto line = std::find_if(lines.begin(), lines.end(), [&](const Line& l) {
-      return l.backend == backend && l.fixture == row.fixture;
-    });
+    auto line = std::find_if(lines.begin(), lines.end(),
+                             [&](const Line& l) { return l.backend == backend && l.fixture == row.fixture; });
     if (line == lines.end()) {
       lines.push_back({backend, row.fixture});
       line = lines.end() - 1;
     }
     line->verdict = combined(line->verdict, judged_verdict(row));
-    if (row.verdict != Verdict::not_run && (!line->worst || worse(row, *line->worst)))
-      line->worst = &row;
+    if (row.verdict != Verdict::not_run && (!line->worst || worse(row, *line->worst))) line->worst = &row;
   }
   return lines;
 }
 
-std::string unit_of(const CheckRow& row) {
-  return row.unit.empty() || row.unit == "1" ? "" : " " + row.unit;
-}
+std::string unit_of(const CheckRow& row) { return row.unit.empty() || row.unit == "1" ? "" : " " + row.unit; }
 
 /// The values themselves, and where; empty where the row knows neither.
 std::string details(const CheckRow& row) {
@@ -64,14 +59,13 @@ std::string details(const CheckRow& row) {
   if (!std::isnan(row.expected)) {
     const char* components[] = {"x: ", "y: ", "z: "};
     const bool component = row.worst_component >= 0 && row.worst_component < 3;
-    text += fmt::format("{}got {:.9g}, expected {:.9g}{}",
-                        component ? components[row.worst_component] : "", row.got, row.expected,
-                        unit_of(row));
+    text += fmt::format("{}got {:.9g}, expected {:.9g}{}", component ? components[row.worst_component] : "", row.got,
+                        row.expected, unit_of(row));
   }
   if (std::isnan(row.worst_x)) return text;
   if (!text.empty()) text += "; ";
-  text += fmt::format("at ({:.6g}, {:.6g}, {:.6g}) m; {} fluid neighbors", row.worst_x,
-                      row.worst_y, row.worst_z, row.fluid_neighbors);
+  text += fmt::format("at ({:.6g}, {:.6g}, {:.6g}) m; {} fluid neighbors", row.worst_x, row.worst_y, row.worst_z,
+                      row.fluid_neighbors);
   if (!row.nearest.empty()) text += ", nearest " + row.nearest;
   return text + fmt::format("; {} wall neighbors", row.wall_neighbors);
 }
@@ -120,20 +114,16 @@ std::string check_label(const CheckRow& row) {
 
 std::string in_full(const CheckRow& row) {
   const Verdict verdict = judged_verdict(row);
-  std::string text = wrapped(fmt::format("{}: {} on {}: {}", to_string(verdict), backend_label(row),
-                                         row.fixture, check_label(row)),
-                             0);
+  std::string text = wrapped(
+      fmt::format("{}: {} on {}: {}", to_string(verdict), backend_label(row), row.fixture, check_label(row)), 0);
   if (verdict == Verdict::fail && row.n > 0) {
     const std::string unit = unit_of(row);
-    std::string figures = fmt::format("error {:.4g}{}, tolerance {:.4g}{}, score {:.3g}", row.value,
-                                      unit, row.tolerance, unit, row.score);
+    std::string figures = fmt::format("error {:.4g}{}, tolerance {:.4g}{}, score {:.3g}", row.value, unit,
+                                      row.tolerance, unit, row.score);
     if (row.worst_id >= 0)
-      figures = fmt::format("{}particle {}: ", row.field == "boundary_volume" ? "wall " : "",
-                            row.worst_id) +
-                figures;
+      figures = fmt::format("{}particle {}: ", row.field == "boundary_volume" ? "wall " : "", row.worst_id) + figures;
     figures += fmt::format("; median score {:.3g}", row.median_score);
-    if (!std::isnan(row.float_score))
-      figures += fmt::format("; sequential fp32 scores {:.3g}", row.float_score);
+    if (!std::isnan(row.float_score)) figures += fmt::format("; sequential fp32 scores {:.3g}", row.float_score);
     figures += fmt::format("; {} compared", row.n);
     if (row.excluded > 0) figures += fmt::format(", {} ambiguous left out", row.excluded);
     text += wrapped(figures, 4) + wrapped(details(row), 4);
@@ -160,14 +150,12 @@ std::string verdict_line(const Report& report) {
     failing += line.verdict == Verdict::fail;
     missing += line.verdict == Verdict::not_run;
   }
-  std::string text =
-      counted(fixtures.size(), "fixture") + " × " + counted(backends.size(), "backend") + ": ";
+  std::string text = counted(fixtures.size(), "fixture") + " × " + counted(backends.size(), "backend") + ": ";
   if (failing == 0 && missing == 0) return text + "pass";
   text += failing > 0 ? "fail" : "not_run";
   std::string detail;
   if (failing > 0) detail = fmt::format("{} of {} fail", failing, lines.size());
-  if (missing > 0)
-    detail += fmt::format("{}{} of {} not run", detail.empty() ? "" : ", ", missing, lines.size());
+  if (missing > 0) detail += fmt::format("{}{} of {} not run", detail.empty() ? "" : ", ", missing, lines.size());
   return text + " (" + detail + ")";
 }
 
@@ -182,12 +170,11 @@ std::string console_table(const Report& report) {
   fixture_width = std::min<std::size_t>(fixture_width, 30);
   const std::size_t check_width = widest - backend_width - fixture_width - 27;
 
-  std::string text = fmt::format("{:{}}  {:{}}  {:7}  {:>11}  {}\n", "backend", backend_width,
-                                 "fixture", fixture_width, "verdict", "worst score", "check");
+  std::string text = fmt::format("{:{}}  {:{}}  {:7}  {:>11}  {}\n", "backend", backend_width, "fixture", fixture_width,
+                                 "verdict", "worst score", "check");
   for (const auto& line : lines)
-    text += fmt::format("{:{}}  {:{}}  {:7}  {:>11}  {}\n", fitted(line.backend, backend_width),
-                        backend_width, fitted(line.fixture, fixture_width), fixture_width,
-                        to_string(line.verdict),
+    text += fmt::format("{:{}}  {:{}}  {:7}  {:>11}  {}\n", fitted(line.backend, backend_width), backend_width,
+                        fitted(line.fixture, fixture_width), fixture_width, to_string(line.verdict),
                         line.worst ? fmt::format("{:.3g}", line.worst->score) : "-",
                         line.worst ? fitted(check_label(*line.worst), check_width) : "-");
   std::string rest;

@@ -14,16 +14,14 @@ namespace {
 constexpr double u = unit_roundoff;
 
 bool turns(const Pose& pose) {
-  return !pose.rotation.isIdentity(0) || pose.pivot != Vec3::Zero() ||
-         pose.angular_velocity != Vec3::Zero();
+  return !pose.rotation.isIdentity(0) || pose.pivot != Vec3::Zero() || pose.angular_velocity != Vec3::Zero();
 }
 
 /// How far the normal turns when the point moves by up to `e` in any direction. Twice as far along each
 /// axis is farther than e along every direction, as 2 > √3. A surface as near as e may show any of the
 /// normals around the point, an edge's whole fan of them: there it is asked in all 26 directions, near by
 /// and farther out.
-double turn_of_normal(const SolidDistance& solid, const Vec3& local, const SurfaceDistance& surface,
-                      double e) {
+double turn_of_normal(const SolidDistance& solid, const Vec3& local, const SurfaceDistance& surface, double e) {
   double turn = 0;
   const auto ask = [&](const Vec3& way) {
     turn = std::max(turn, (solid.at(local + way).normal - surface.normal).norm());
@@ -65,14 +63,13 @@ ContactBounds::ContactBounds(const Scene& scene)
 bool ContactBounds::near_seam(std::size_t container, const Vec3& place, double width) const {
   const double r = std::hypot(place.x(), place.y());
   for (const ProfileEdge& e : edges_[container])
-    if (std::hypot(r - e.r0, place.z() - e.z0) <= width || std::hypot(r - e.r1, place.z() - e.z1) <= width)
-      return true;
+    if (std::hypot(r - e.r0, place.z() - e.z0) <= width || std::hypot(r - e.r1, place.z() - e.z1) <= width) return true;
   for (const BoxFace& f : faces_[container]) {
     bool on_face = true, at_end = false;
     for (int a = 0; a < 3; ++a) {
       on_face = on_face && place[a] >= f.min[a] - width && place[a] <= f.max[a] + width;
-      at_end = at_end || (a != f.axis && (std::abs(place[a] - f.min[a]) <= width ||
-                                          std::abs(place[a] - f.max[a]) <= width));
+      at_end =
+          at_end || (a != f.axis && (std::abs(place[a] - f.min[a]) <= width || std::abs(place[a] - f.max[a]) <= width));
     }
     if (on_face && at_end) return true;
   }
@@ -103,8 +100,8 @@ void ContactBounds::fly(BoundedParticle& p) const {
   }
 }
 
-void ContactBounds::respond(double distance, const Vec3& normal, const Pose& pose, double epsilon,
-                            double tau_n, BoundedParticle& p) const {
+void ContactBounds::respond(double distance, const Vec3& normal, const Pose& pose, double epsilon, double tau_n,
+                            BoundedParticle& p) const {
   const double reach = scene_.contact_distance(), way = std::max(0.0, reach - distance);
   const Vec3 v = p.v;
   // Also where the oracle's own distance is not within reach.
@@ -113,11 +110,9 @@ void ContactBounds::respond(double distance, const Vec3& normal, const Pose& pos
   p.tau_x = (p.tau_x.norm() + epsilon + way * (tau_n + 2 * u)) * Vec3::Ones() + 2 * u * p.x.cwiseAbs();
 
   const Vec3 wall = pose.velocity_at(p.x), w = v - wall;
-  const double tau_wall =
-      pose.angular_velocity.norm() *
-          (p.tau_x.norm() +
-           4 * u * (p.x.norm() + pose.pivot.norm() + (p.x - pose.pivot).norm())) +
-      3 * u * (pose.linear_velocity.norm() + pose.surface_velocity.norm() + wall.norm());
+  const double tau_wall = pose.angular_velocity.norm() *
+                              (p.tau_x.norm() + 4 * u * (p.x.norm() + pose.pivot.norm() + (p.x - pose.pivot).norm())) +
+                          3 * u * (pose.linear_velocity.norm() + pose.surface_velocity.norm() + wall.norm());
   const double tau_v = p.tau_v.norm();
   if (w.dot(normal) > tau_v + tau_wall + w.norm() * (tau_n + 5 * u)) return;
   const double e = scene_.contact.restitution, k = (1 + e) * scene_.contact.friction;
@@ -133,8 +128,7 @@ void ContactBounds::contact(std::size_t container, const Pose& pose, BoundedPart
     const Vec3 local = pose.to_local(p.x);
     double epsilon = u * (2 * pose.translation.norm() + 16 * local.norm());
     if (turns(pose))
-      epsilon += u * (pose.pivot.norm() + 8 * (p.x - pose.pivot).norm() +
-                      (pose.translation - pose.pivot).norm());
+      epsilon += u * (pose.pivot.norm() + 8 * (p.x - pose.pivot).norm() + (pose.translation - pose.pivot).norm());
     const double e = p.tau_x.norm() + epsilon;
     if (!solid.may_be_within(reach + e, local)) return;
     const SurfaceDistance surface = solid.at(local);

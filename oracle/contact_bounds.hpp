@@ -15,8 +15,8 @@ namespace decant {
 
 /// A particle, and how far a correct fp32 code may be from it, component by component.
 struct BoundedParticle {
-  Vec3 x, v;          // m, m/s
-  Vec3 tau_x, tau_v;  // m, m/s
+  Vec3 x, v;               // m, m/s
+  Vec3 tau_x, tau_v;       // m, m/s
   bool ambiguous = false;  // the nearest face cannot be told
   /// Contacts that fp32 cannot decide, so far; bit k of `flips` turns the k-th round.
   int undecided = 0;

@@ -75,8 +75,7 @@ class Probes {
   /// \param reference_speed  m/s, of fast probes
   Probes(const Scene& scene, std::int64_t substep, double reference_speed)
       : scene_(scene), bounds_(scene_), speed_(reference_speed), substep_(substep) {
-    for (int k = 0; k <= contact_run; ++k)
-      poses_.push_back(bounds_.poses_at(scene_.time_at(substep + k)));
+    for (int k = 0; k <= contact_run; ++k) poses_.push_back(bounds_.poses_at(scene_.time_at(substep + k)));
   }
 
   void add(const Vec3& position, const Vec3& velocity) {
@@ -89,13 +88,11 @@ class Probes {
     const double dt = scene_.time_step(), reach = scene_.contact_distance();
     std::vector<Eigen::Index> touching;
     for (Eigen::Index i = 0; i < state.size(); ++i) {
-      const Vec3 x = state.position.col(i) +
-                     dt * (state.velocity.col(i) + dt * acceleration.col(i));
+      const Vec3 x = state.position.col(i) + dt * (state.velocity.col(i) + dt * acceleration.col(i));
       bool near = scene_.floor && x.z() - scene_.floor->height < reach;
       for (std::size_t c = 0; c < bounds_.solids().size() && !near; ++c) {
         const Vec3 local = poses_[1][c].to_local(x);
-        near = bounds_.solids()[c].may_be_within(reach, local) &&
-               bounds_.solids()[c].at(local).distance < reach;
+        near = bounds_.solids()[c].may_be_within(reach, local) && bounds_.solids()[c].at(local).distance < reach;
       }
       if (near) touching.push_back(i);
     }
@@ -135,8 +132,7 @@ class Probes {
       const Vec3 x = state.position.col(i), v = state.velocity.col(i);
       std::vector<SubstepOutcome> first, later;
       bool stays = inside(scene_.domain, x, scene_.particle_spacing);
-      const bool known = follow(x, v, 1, first, stays),
-                 known_later = follow(x, v, contact_run, later, stays);
+      const bool known = follow(x, v, 1, first, stays), known_later = follow(x, v, contact_run, later, stays);
       if (!known || !stays) continue;
       if (known_later) {
         problem.later_id.push_back(n);
@@ -195,11 +191,20 @@ class Probes {
     const double speed = speed_ * (draw_.below(3) == 0 ? 0.05 : 1.0);
     Vec3 v = wall;
     switch (way) {
-      case 0: v += speed * (-normal + 0.3 * slides); break;
-      case 1: v += speed * (-0.3 * normal + slides); break;
-      case 2: v += speed * (-0.01 * normal + slides); break;
-      case 3: v += speed * (0.3 * normal + slides); break;
-      default: v = Vec3::Zero();
+      case 0:
+        v += speed * (-normal + 0.3 * slides);
+        break;
+      case 1:
+        v += speed * (-0.3 * normal + slides);
+        break;
+      case 2:
+        v += speed * (-0.01 * normal + slides);
+        break;
+      case 3:
+        v += speed * (0.3 * normal + slides);
+        break;
+      default:
+        v = Vec3::Zero();
     }
     // After some flight no deeper than a substep's way can be.
     const double closing = std::max(0.0, (wall - v).dot(normal)) * dt;
@@ -209,8 +214,7 @@ class Probes {
 
   /// Outcomes so many substeps on; false where contacts cannot be told. One that leaves the domain does not
   /// stay.
-  bool follow(const Vec3& x, const Vec3& v, int substeps, std::vector<SubstepOutcome>& outcomes,
-              bool& stays) const {
+  bool follow(const Vec3& x, const Vec3& v, int substeps, std::vector<SubstepOutcome>& outcomes, bool& stays) const {
     bool known = true;
     const auto run = [&](unsigned flips) {
       BoundedParticle p{x, v, Vec3::Zero(), Vec3::Zero()};
@@ -292,8 +296,7 @@ std::vector<ContactProblem> contact_problems(const Scene& scene, const ParticleS
                                              const Eigen::Matrix3Xd& acceleration) {
   std::vector<ContactProblem> problems;
   if (scene.containers.empty() && !scene.floor) return problems;
-  const double speed = std::min(0.1 * scene.fluid.sound_speed,
-                                0.2 * scene.particle_spacing / scene.time_step());
+  const double speed = std::min(0.1 * scene.fluid.sound_speed, 0.2 * scene.particle_spacing / scene.time_step());
   Scene free = force_free(scene);
   Probes own(free, state.substep, speed);
   own.add_touching(state, acceleration);
@@ -312,11 +315,9 @@ std::vector<ContactProblem> contact_problems(const Scene& scene, const ParticleS
   return problems;
 }
 
-void judge_contact(Backend& backend, const Walls& walls,
-                   const std::vector<ContactProblem>& problems, Sheet& sheet) {
+void judge_contact(Backend& backend, const Walls& walls, const std::vector<ContactProblem>& problems, Sheet& sheet) {
   Compared first, later;
-  for (auto* values : {&first.position, &first.velocity, &later.position, &later.velocity})
-    values->components = 3;
+  for (auto* values : {&first.position, &first.velocity, &later.position, &later.velocity}) values->components = 3;
   for (const ContactProblem& problem : problems) {
     const auto n = problem.state.size();
     const auto advance = [&](int substeps, ParticleState& state) {
@@ -326,8 +327,8 @@ void judge_contact(Backend& backend, const Walls& walls,
       }
       backend.read(state);
       if (state.position.cols() == n && state.velocity.cols() == n) return true;
-      sheet.failed("contact", fmt::format("{} positions and {} velocities, not {}",
-                                          state.position.cols(), state.velocity.cols(), n));
+      sheet.failed("contact", fmt::format("{} positions and {} velocities, not {}", state.position.cols(),
+                                          state.velocity.cols(), n));
       return false;
     };
     backend.load(problem.scene, walls, problem.state);
@@ -340,8 +341,7 @@ void judge_contact(Backend& backend, const Walls& walls,
     told.velocity = state.velocity(Eigen::all, problem.later_id);
     append(later, problem.scene, told, problem.later);
   }
-  const auto row = [&](const std::string& field, const char* unit, const Values& values,
-                       bool after_the_run) {
+  const auto row = [&](const std::string& field, const char* unit, const Values& values, bool after_the_run) {
     CheckRow& r = sheet.row("contact", field, unit);
     compare(values, r);
     if (r.verdict != Verdict::fail || r.worst_id < 0) return;
@@ -349,17 +349,15 @@ void judge_contact(Backend& backend, const Walls& walls,
     std::int64_t probe = r.worst_id;
     r.worst_id = -1;
     for (const ContactProblem& problem : problems) {
-      const auto count = static_cast<std::int64_t>(after_the_run ? problem.later_id.size()
-                                                                 : problem.first.size());
+      const auto count = static_cast<std::int64_t>(after_the_run ? problem.later_id.size() : problem.first.size());
       if (probe >= count) {
         probe -= count;
         continue;
       }
       const Eigen::Index i = after_the_run ? problem.later_id[static_cast<std::size_t>(probe)] : probe;
       const Vec3 x = problem.state.position.col(i), v = problem.state.velocity.col(i);
-      r.reason = fmt::format(
-          "a probe from ({:.9g}, {:.9g}, {:.9g}) m at ({:.9g}, {:.9g}, {:.9g}) m/s, substep {}", x.x(),
-          x.y(), x.z(), v.x(), v.y(), v.z(), problem.state.substep);
+      r.reason = fmt::format("a probe from ({:.9g}, {:.9g}, {:.9g}) m at ({:.9g}, {:.9g}, {:.9g}) m/s, substep {}",
+                             x.x(), x.y(), x.z(), v.x(), v.y(), v.z(), problem.state.substep);
       return;
     }
   };

@@ -38,7 +38,6 @@ std::vector<ContactProblem> contact_problems(const Scene& scene, const ParticleS
                                              const Eigen::Matrix3Xd& acceleration);
 
 /// Rows position and velocity, one substep on and after the run.
-void judge_contact(Backend& backend, const Walls& walls,
-                   const std::vector<ContactProblem>& problems, Sheet& sheet);
+void judge_contact(Backend& backend, const Walls& walls, const std::vector<ContactProblem>& problems, Sheet& sheet);
 
 }  // namespace decant

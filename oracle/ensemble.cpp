@@ -30,8 +30,7 @@ double percentile99(std::vector<double> lengths) {
   if (lengths.empty()) return 0;
   for (const double d : lengths)
     if (std::isnan(d)) return d;  // nth_element would lose it
-  const auto at = lengths.begin() +
-                  static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(lengths.size() - 1));
+  const auto at = lengths.begin() + static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(lengths.size() - 1));
   std::nth_element(lengths.begin(), at, lengths.end());
   return *at;
 }
@@ -82,8 +81,7 @@ Divergence divergence(const Scene& scene, const ParticleState& a, const Particle
     x.push_back(separation(Vec3(a.position.col(i)), Vec3(b.position.col(i))).norm());
     v.push_back((a.velocity.col(i) - b.velocity.col(i)).norm());
   }
-  return {rms(x), percentile99(x), rms(v), percentile99(v),
-          std::abs(energy(scene, a) - energy(scene, b))};
+  return {rms(x), percentile99(x), rms(v), percentile99(v), std::abs(energy(scene, a) - energy(scene, b))};
 }
 
 namespace {
@@ -95,8 +93,7 @@ ParticleState run_undisturbed(Solver solver, std::int64_t substeps) {
 
 /// A disturbance leaves the walls' volumes alone: V_b knows nothing but their own distances.
 ParticleState run_disturbed(const Scene& scene, const Walls& walls, const Eigen::VectorXd& volumes,
-                            const ParticleState& start, std::int64_t substeps,
-                            std::uint32_t seed) {
+                            const ParticleState& start, std::int64_t substeps, std::uint32_t seed) {
   Disturbance disturbance(seed);
   Scene its_scene = scene;
   disturbance.of(its_scene);
@@ -114,30 +111,27 @@ ParticleState run_disturbed(const Scene& scene, const Walls& walls, const Eigen:
 
 }  // namespace
 
-ParticleState run_oracle(const Scene& scene, const Walls& walls, const ParticleState& start,
-                         std::int64_t substeps) {
+ParticleState run_oracle(const Scene& scene, const Walls& walls, const ParticleState& start, std::int64_t substeps) {
   return run_undisturbed(Solver(scene, walls, start), substeps);
 }
 
-ParticleState run_disturbed(const Scene& scene, const Walls& walls, const ParticleState& start,
-                            std::int64_t substeps, std::uint32_t seed) {
+ParticleState run_disturbed(const Scene& scene, const Walls& walls, const ParticleState& start, std::int64_t substeps,
+                            std::uint32_t seed) {
   return run_disturbed(scene, walls, boundary_volumes<double>(scene, walls), start, substeps, seed);
 }
 
-Ensemble run_ensemble(const Scene& scene, const Walls& walls, const ParticleState& start,
-                      std::int64_t substeps, std::int64_t members, std::uint32_t seed) {
+Ensemble run_ensemble(const Scene& scene, const Walls& walls, const ParticleState& start, std::int64_t substeps,
+                      std::int64_t members, std::uint32_t seed) {
   const Eigen::VectorXd volumes = boundary_volumes<double>(scene, walls);
-  const ParticleState undisturbed =
-      run_undisturbed(Solver(scene, walls, start, volumes), substeps);
+  const ParticleState undisturbed = run_undisturbed(Solver(scene, walls, start, volumes), substeps);
   Ensemble e;
   e.substeps = substeps;
   e.members = members;
   std::vector<Divergence> all;
   for (std::int64_t m = 0; m < members; ++m)
-    all.push_back(divergence(
-        scene,
-        run_disturbed(scene, walls, volumes, start, substeps, seed + static_cast<std::uint32_t>(m)),
-        undisturbed));
+    all.push_back(
+        divergence(scene, run_disturbed(scene, walls, volumes, start, substeps, seed + static_cast<std::uint32_t>(m)),
+                   undisturbed));
   const auto count = static_cast<double>(members);
   for (std::size_t k = 0; k < e.mean.size(); ++k) {
     for (const auto& d : all) e.mean[k] += d[k] / count;
@@ -153,8 +147,7 @@ Divergence divergence_bound(const Ensemble& ensemble) {
   // four to the container's frame, two of distance and normal, two of the push; they add in squares.
   constexpr double roundings = 3;
   Divergence bound{};
-  for (std::size_t k = 0; k < bound.size(); ++k)
-    bound[k] = roundings * (ensemble.mean[k] + 6 * ensemble.deviation[k]);
+  for (std::size_t k = 0; k < bound.size(); ++k) bound[k] = roundings * (ensemble.mean[k] + 6 * ensemble.deviation[k]);
   return bound;
 }
 

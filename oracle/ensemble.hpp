@@ -13,8 +13,8 @@
 namespace decant {
 
 /// Measures of the distance between two states; the first four over particles.
-inline constexpr std::array<const char*, 5> divergence_names = {
-    "rms_position", "p99_position", "rms_velocity", "p99_velocity", "energy"};
+inline constexpr std::array<const char*, 5> divergence_names = {"rms_position", "p99_position", "rms_velocity",
+                                                                "p99_velocity", "energy"};
 inline constexpr std::array<const char*, 5> divergence_units = {"m", "m", "m/s", "m/s", "J"};
 using Divergence = std::array<double, 5>;
 
@@ -32,16 +32,15 @@ struct Ensemble {
 /// multiplied by 1 + u r, u = 2⁻²⁴, r uniform in [−1, 1], and rounded to fp32, as a backend stores them;
 /// so is the end. Once, so is every constant that fp32 rounds once for all: mass, sound speed,
 /// viscosities, gravity, dt, and where walls and floor stand and from how far they push.
-ParticleState run_disturbed(const Scene& scene, const Walls& walls, const ParticleState& start,
-                            std::int64_t substeps, std::uint32_t seed);
+ParticleState run_disturbed(const Scene& scene, const Walls& walls, const ParticleState& start, std::int64_t substeps,
+                            std::uint32_t seed);
 
 /// Runs it, sequentially, members seeded with seed, seed + 1, ….
-Ensemble run_ensemble(const Scene& scene, const Walls& walls, const ParticleState& start,
-                      std::int64_t substeps, std::int64_t members, std::uint32_t seed = 1);
+Ensemble run_ensemble(const Scene& scene, const Walls& walls, const ParticleState& start, std::int64_t substeps,
+                      std::int64_t members, std::uint32_t seed = 1);
 
 /// The oracle's own state `substeps` on.
-ParticleState run_oracle(const Scene& scene, const Walls& walls, const ParticleState& start,
-                         std::int64_t substeps);
+ParticleState run_oracle(const Scene& scene, const Walls& walls, const ParticleState& start, std::int64_t substeps);
 
 /// What a correct fp32 backend may be apart: 3 (mean + 6 deviations). The 3 is √9, the roundings of a
 /// contact beside the one that a disturbance stands for.

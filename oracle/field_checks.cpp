@@ -12,33 +12,30 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// Compares where the field was answered, else leaves a row that did not run.
-void judge_field(const char* check, const char* name, const char* unit, const Answered& answered,
-                 const Values& values, Sheet& sheet) {
+void judge_field(const char* check, const char* name, const char* unit, const Answered& answered, const Values& values,
+                 Sheet& sheet) {
   CheckRow& row = sheet.row(check, name, unit);
-  if (answered.count(name))
-    compare(values, row);
-  else
-    row.reason = not_given;
+  if (answered.count(name)) compare(values, row);
+  else row.reason = not_given;
 }
 
-void judge_accelerations(const char* check, const Fields& got, const Answered& answered,
-                         const OracleAnswer& oracle, const Fields& in_float, Sheet& sheet) {
+void judge_accelerations(const char* check, const Fields& got, const Answered& answered, const OracleAnswer& oracle,
+                         const Fields& in_float, Sheet& sheet) {
   for (const auto& field : acceleration_fields)
     judge_field(check, field.name, "m/s^2", answered,
-                {flat(got.*field.member), flat(oracle.fields.*field.member),
-                 flat(oracle.tolerance.*field.member), flat(in_float.*field.member), 3, nullptr, 0},
+                {flat(got.*field.member), flat(oracle.fields.*field.member), flat(oracle.tolerance.*field.member),
+                 flat(in_float.*field.member), 3, nullptr, 0},
                 sheet);
 }
 
 /// The outcome that position and velocity together are nearest to, by score.
-const SubstepOutcome& nearest_outcome(const std::vector<SubstepOutcome>& outcomes,
-                                      const ParticleState& got, Eigen::Index i) {
+const SubstepOutcome& nearest_outcome(const std::vector<SubstepOutcome>& outcomes, const ParticleState& got,
+                                      Eigen::Index i) {
   const SubstepOutcome* nearest = &outcomes.front();
   double least = infinity;
   for (const SubstepOutcome& outcome : outcomes) {
     double worst = 0;
-    const auto apart = [&](const Eigen::Matrix3Xd& values, const Vec3& expected,
-                           const Vec3& tolerance) {
+    const auto apart = [&](const Eigen::Matrix3Xd& values, const Vec3& expected, const Vec3& tolerance) {
       for (int c = 0; c < 3 && i < values.cols(); ++c)
         worst = std::max(worst, score_of(std::abs(values(c, i) - expected[c]), tolerance[c]));
     };
@@ -54,11 +51,9 @@ const SubstepOutcome& nearest_outcome(const std::vector<SubstepOutcome>& outcome
 
 }  // namespace
 
-NearestOutcomes nearest_outcomes(const std::vector<std::vector<SubstepOutcome>>& outcomes,
-                                 const ParticleState& got) {
+NearestOutcomes nearest_outcomes(const std::vector<std::vector<SubstepOutcome>>& outcomes, const ParticleState& got) {
   const auto n = static_cast<Eigen::Index>(outcomes.size());
-  NearestOutcomes all{Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n),
-                      Eigen::Matrix3Xd(3, n)};
+  NearestOutcomes all{Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n)};
   for (Eigen::Index i = 0; i < n; ++i) {
     const SubstepOutcome& nearest = nearest_outcome(outcomes[static_cast<std::size_t>(i)], got, i);
     all.position.col(i) = nearest.position;
@@ -97,15 +92,19 @@ const Answered& all_answered() {
   return all;
 }
 
-void judge_stages(const Fields& got, const Answered& answered, const Judgement& oracle,
-                  Sheet& sheet) {
+void judge_stages(const Fields& got, const Answered& answered, const Judgement& oracle, Sheet& sheet) {
   const OracleAnswer& own = oracle.own;
   for (const NeighborFact& fact : neighbor_facts) {
     const Eigen::VectorXd expected = flat(own.fields.*fact.member);
     judge_field("neighbors", fact.name, "1", answered,
-                {flat(got.*fact.member), expected, Eigen::VectorXd::Zero(expected.size()), {}, 1,
+                {flat(got.*fact.member),
+                 expected,
+                 Eigen::VectorXd::Zero(expected.size()),
+                 {},
+                 1,
                  fact.of_walls ? &own.wall_ambiguous : &own.fluid_ambiguous,
-                 fact.of_walls ? own.most_wall_ambiguous : own.most_fluid_ambiguous, 0.0},
+                 fact.of_walls ? own.most_wall_ambiguous : own.most_fluid_ambiguous,
+                 0.0},
                 sheet);
   }
   for (const StageField& field : stage_fields)
@@ -115,17 +114,15 @@ void judge_stages(const Fields& got, const Answered& answered, const Judgement& 
                 sheet);
 }
 
-void judge_staged(const Fields& got, const Answered& answered, const Judgement& oracle,
-                  Sheet& sheet) {
+void judge_staged(const Fields& got, const Answered& answered, const Judgement& oracle, Sheet& sheet) {
   judge_field("equation_of_state", "pressure", "Pa", answered,
-              {got.pressure, oracle.given.fields.pressure, oracle.given.tolerance.pressure,
-               oracle.given_float.pressure, 1, nullptr, 0},
+              {got.pressure, oracle.given.fields.pressure, oracle.given.tolerance.pressure, oracle.given_float.pressure,
+               1, nullptr, 0},
               sheet);
   judge_accelerations("acceleration", got, answered, oracle.given, oracle.given_float, sheet);
 }
 
-void judge_evaluation(const Fields& got, const Answered& answered, const Judgement& oracle,
-                      Sheet& sheet) {
+void judge_evaluation(const Fields& got, const Answered& answered, const Judgement& oracle, Sheet& sheet) {
   judge_accelerations("evaluation", got, answered, oracle.own, oracle.own_float, sheet);
 }
 
@@ -138,40 +135,58 @@ void judge_substep(const ParticleState& answer_of_backend, const Answered& answe
   // a wall: one projection the one way, and two as long the other way; and no faster than sound.
   const double apart = std::max(fixture.scene.particle_spacing, 3 * answer.longest_push);
   judge_field("substep", "position", "m", answered,
-              {flat(got.position), flat(nearest.position), flat(nearest.position_tolerance), {}, 3, &answer.ambiguous,
-               answer.most_ambiguous, -infinity, apart},
+              {flat(got.position),
+               flat(nearest.position),
+               flat(nearest.position_tolerance),
+               {},
+               3,
+               &answer.ambiguous,
+               answer.most_ambiguous,
+               -infinity,
+               apart},
               sheet);
   judge_field("substep", "velocity", "m/s", answered,
-              {flat(got.velocity), flat(nearest.velocity), flat(nearest.velocity_tolerance), {}, 3, &answer.ambiguous,
-               answer.most_ambiguous, -infinity, fixture.scene.fluid.sound_speed},
+              {flat(got.velocity),
+               flat(nearest.velocity),
+               flat(nearest.velocity_tolerance),
+               {},
+               3,
+               &answer.ambiguous,
+               answer.most_ambiguous,
+               -infinity,
+               fixture.scene.fluid.sound_speed},
               sheet);
 }
 
-void judge_fields(const char* check, const std::string& after, const Fields& got,
-                  const OracleAnswer& oracle, Sheet& sheet) {
+void judge_fields(const char* check, const std::string& after, const Fields& got, const OracleAnswer& oracle,
+                  Sheet& sheet) {
   const auto row = [&](const char* field, const char* unit) -> CheckRow& {
     return sheet.row(check, field + after, unit);
   };
   for (const NeighborFact& fact : neighbor_facts) {
     const Eigen::VectorXd expected = flat(oracle.fields.*fact.member);
-    compare({flat(got.*fact.member), expected, Eigen::VectorXd::Zero(expected.size()), {}, 1,
+    compare({flat(got.*fact.member),
+             expected,
+             Eigen::VectorXd::Zero(expected.size()),
+             {},
+             1,
              fact.of_walls ? &oracle.wall_ambiguous : &oracle.fluid_ambiguous,
-             fact.of_walls ? oracle.most_wall_ambiguous : oracle.most_fluid_ambiguous, 0.0},
+             fact.of_walls ? oracle.most_wall_ambiguous : oracle.most_fluid_ambiguous,
+             0.0},
             row(fact.name, "1"));
   }
   for (const StageField& field : stage_fields)
     compare({got.*field.member, oracle.fields.*field.member, oracle.tolerance.*field.member, {}},
             row(field.name, field.unit));
   for (const AccelerationField& field : acceleration_fields)
-    compare({flat(got.*field.member), flat(oracle.fields.*field.member),
-             flat(oracle.tolerance.*field.member), {}, 3},
+    compare({flat(got.*field.member), flat(oracle.fields.*field.member), flat(oracle.tolerance.*field.member), {}, 3},
             row(field.name, "m/s^2"));
 }
 
-void judge_momentum(const Fields& got, const Answered& answered, const Fixture& fixture,
-                    const Judgement& oracle, Sheet& sheet) {
+void judge_momentum(const Fields& got, const Answered& answered, const Fixture& fixture, const Judgement& oracle,
+                    Sheet& sheet) {
   const double mass = fixture.scene.particle_mass();
-  const auto momentum = [&](const char* name, const char* part, Eigen::Matrix3Xd Fields::*field) {
+  const auto momentum = [&](const char* name, const char* part, Eigen::Matrix3Xd Fields::* field) {
     CheckRow& row = sheet.row("conservation", name, "N");
     if (!answered.count(part)) {
       row.reason = not_given;

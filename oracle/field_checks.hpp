@@ -13,7 +13,7 @@ namespace decant {
 
 struct AccelerationField {
   const char* name;
-  Eigen::Matrix3Xd Fields::*member;
+  Eigen::Matrix3Xd Fields::* member;
 };
 /// The four parts, and their sum with gravity.
 inline constexpr AccelerationField acceleration_fields[] = {
@@ -26,7 +26,7 @@ inline constexpr AccelerationField acceleration_fields[] = {
 
 struct NeighborFact {
   const char* name;
-  IdVector Fields::*member;
+  IdVector Fields::* member;
   bool of_walls;
 };
 inline constexpr NeighborFact neighbor_facts[] = {
@@ -38,7 +38,7 @@ inline constexpr NeighborFact neighbor_facts[] = {
 
 struct StageField {
   const char* name;
-  Eigen::VectorXd Fields::*member;
+  Eigen::VectorXd Fields::* member;
   const char* unit;
 };
 inline constexpr StageField stage_fields[] = {
@@ -58,16 +58,13 @@ const Answered& all_answered();
 inline constexpr const char* not_given = "not given";
 
 /// Rows `neighbors`, `boundary_volume`, `density`, `pressure`, each from the stage before.
-void judge_stages(const Fields& got, const Answered& answered, const Judgement& oracle,
-                  Sheet& sheet);
+void judge_stages(const Fields& got, const Answered& answered, const Judgement& oracle, Sheet& sheet);
 
 /// Rows `equation_of_state`, `acceleration`: from the oracle's own density and pressure.
-void judge_staged(const Fields& got, const Answered& answered, const Judgement& oracle,
-                  Sheet& sheet);
+void judge_staged(const Fields& got, const Answered& answered, const Judgement& oracle, Sheet& sheet);
 
 /// Row `evaluation`: accelerations from one's own density and pressure.
-void judge_evaluation(const Fields& got, const Answered& answered, const Judgement& oracle,
-                      Sheet& sheet);
+void judge_evaluation(const Fields& got, const Answered& answered, const Judgement& oracle, Sheet& sheet);
 
 /// What particles may be, each in the outcome that position and velocity together are nearest to, by score.
 struct NearestOutcomes {
@@ -75,8 +72,7 @@ struct NearestOutcomes {
   Eigen::Matrix3Xd position_tolerance, velocity_tolerance;  // 3×N, m, m/s
 };
 /// \param outcomes  per particle at least one; \param got  of another number of particles: the first ones
-NearestOutcomes nearest_outcomes(const std::vector<std::vector<SubstepOutcome>>& outcomes,
-                                 const ParticleState& got);
+NearestOutcomes nearest_outcomes(const std::vector<std::vector<SubstepOutcome>>& outcomes, const ParticleState& got);
 
 /// Positions as the images nearest to the first outcomes: where fp32 cannot tell on which side of a period a
 /// particle came back in, both are the same point. One that was not put back into its period stays.
@@ -86,16 +82,16 @@ ParticleState nearest_images(ParticleState got, const Scene& scene,
 /// Row `substep`. Position and velocity, as far as answered, are held together to the outcome that
 /// they are nearest to.
 /// \param got  one substep after the fixture's state, in id order
-void judge_substep(const ParticleState& got, const Answered& answered, const Fixture& fixture,
-                   const Judgement& oracle, Sheet& sheet);
+void judge_substep(const ParticleState& got, const Answered& answered, const Fixture& fixture, const Judgement& oracle,
+                   Sheet& sheet);
 
 /// Rows of neighbor facts, density, pressure and accelerations against the oracle's answer at the same
 /// state. \param after  follows each field's name, as in "density after 3"
-void judge_fields(const char* check, const std::string& after, const Fields& got,
-                  const OracleAnswer& oracle, Sheet& sheet);
+void judge_fields(const char* check, const std::string& after, const Fields& got, const OracleAnswer& oracle,
+                  Sheet& sheet);
 
 /// Row `conservation`: what the parts of `judge_staged` that act between fluid particles add up to.
-void judge_momentum(const Fields& got, const Answered& answered, const Fixture& fixture,
-                    const Judgement& oracle, Sheet& sheet);
+void judge_momentum(const Fields& got, const Answered& answered, const Fixture& fixture, const Judgement& oracle,
+                    Sheet& sheet);
 
 }  // namespace decant

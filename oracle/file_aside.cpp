@@ -19,8 +19,8 @@ namespace {
 /// A name that no other thread, process or machine uses; whether it is free says who opens it.
 std::filesystem::path name_beside(const std::filesystem::path& file) {
   static std::atomic<int> counter{0};
-  return file.parent_path() / fmt::format(".{}.{}-{}-{:08x}.tmp", file.filename().string(),
-                                          ::getpid(), counter.fetch_add(1), std::random_device()());
+  return file.parent_path() / fmt::format(".{}.{}-{}-{:08x}.tmp", file.filename().string(), ::getpid(),
+                                          counter.fetch_add(1), std::random_device()());
 }
 
 }  // namespace
@@ -55,8 +55,7 @@ void FileAside::write(std::string_view bytes) {
 }
 
 void FileAside::commit() {
-  if (::fsync(descriptor_) != 0 || ::close(std::exchange(descriptor_, -1)) != 0)
-    fail(std::strerror(errno));
+  if (::fsync(descriptor_) != 0 || ::close(std::exchange(descriptor_, -1)) != 0) fail(std::strerror(errno));
   std::error_code error;
   std::filesystem::rename(aside_, file_, error);
   if (error) fail(error.message().c_str());

@@ -19,8 +19,7 @@ namespace decant {
 namespace {
 
 /// Reports a wrong value; does not return.
-using Fail =
-    std::function<void(const std::string& key, const std::string& value, const std::string& bound)>;
+using Fail = std::function<void(const std::string& key, const std::string& value, const std::string& bound)>;
 
 // More than any scene of this project has by far; beyond it sampling would only eat memory.
 constexpr double most_wall_particles = 1e8;
@@ -34,8 +33,7 @@ void for_each_field(F& f, const Visit& visit) {
   visit("/oracle/acceleration", f.acceleration, "sum of the four parts and gravity", "m/s^2");
   visit("/oracle/pressure_acceleration", f.pressure_acceleration, "fluid on fluid", "m/s^2");
   visit("/oracle/viscous_acceleration", f.viscous_acceleration, "fluid on fluid", "m/s^2");
-  visit("/oracle/wall_pressure_acceleration", f.wall_pressure_acceleration, "wall on fluid",
-        "m/s^2");
+  visit("/oracle/wall_pressure_acceleration", f.wall_pressure_acceleration, "wall on fluid", "m/s^2");
   visit("/oracle/wall_viscous_acceleration", f.wall_viscous_acceleration, "wall on fluid", "m/s^2");
   visit("/oracle/fluid_neighbor_count", f.fluid_neighbor_count, "self excluded", "");
   visit("/oracle/fluid_neighbor_id_sum", f.fluid_neighbor_id_sum, "self excluded", "");
@@ -67,12 +65,10 @@ void for_each_sample(F& f, const Visit& visit) {
 /// Writes a dataset by the type of its member.
 struct Put {
   Hdf5Writer& out;
-  void operator()(const char* path, const Eigen::VectorXd& v, const char* text,
-                  const char* unit) const {
+  void operator()(const char* path, const Eigen::VectorXd& v, const char* text, const char* unit) const {
     out.vector(path, v, unit, text);
   }
-  void operator()(const char* path, const Eigen::Matrix3Xd& m, const char* text,
-                  const char* unit) const {
+  void operator()(const char* path, const Eigen::Matrix3Xd& m, const char* text, const char* unit) const {
     out.matrix3(path, m, unit, text);
   }
   void operator()(const char* path, const IdVector& v, const char* text, const char*) const {
@@ -87,12 +83,8 @@ struct Get {
   void operator()(const char* path, Eigen::VectorXd& v, const char*, const char*) const {
     v = in.vector(path, std::string_view(path) == "/oracle/boundary_volume" ? walls : n);
   }
-  void operator()(const char* path, Eigen::Matrix3Xd& m, const char*, const char*) const {
-    m = in.matrix3(path, n);
-  }
-  void operator()(const char* path, IdVector& v, const char*, const char*) const {
-    v = in.integers(path, n);
-  }
+  void operator()(const char* path, Eigen::Matrix3Xd& m, const char*, const char*) const { m = in.matrix3(path, n); }
+  void operator()(const char* path, IdVector& v, const char*, const char*) const { v = in.integers(path, n); }
 };
 
 std::string place_of(double value, Eigen::Index column, Eigen::Index row, Eigen::Index rows) {
@@ -112,17 +104,13 @@ struct Check {
     const bool is_matrix = Derived::RowsAtCompileTime == 3;
     const Eigen::Index length = is_matrix ? cols : rows;
     const Eigen::Index expected = path == "/oracle/boundary_volume" ? walls : n;
-    if (length != expected)
-      fail(path, fmt::format("{} values", length), fmt::format("{} values", expected));
+    if (length != expected) fail(path, fmt::format("{} values", length), fmt::format("{} values", expected));
     for (Eigen::Index c = 0; c < cols; ++c)
       for (Eigen::Index r = 0; r < rows; ++r) {
         const auto value = static_cast<double>(values(r, c));
-        const auto where = [&] {
-          return is_matrix ? place_of(value, c, r, 3) : place_of(value, r, 0, 1);
-        };
+        const auto where = [&] { return is_matrix ? place_of(value, c, r, 3) : place_of(value, r, 0, 1); };
         if (!std::isfinite(value)) fail(path, where(), "finite");
-        if (path.starts_with("/state/") &&
-            !(static_cast<double>(static_cast<float>(value)) == value))
+        if (path.starts_with("/state/") && !(static_cast<double>(static_cast<float>(value)) == value))
           fail(path, where(), "representable in fp32");
         if (must_not_be_negative(path) && !(value >= 0)) fail(path, where(), ">= 0");
         if (must_be_positive(path) && !(value > 0)) fail(path, where(), "> 0");
@@ -169,17 +157,15 @@ void check_fixture(const Fixture& f, Eigen::Index walls, const Fail& fail) {
   check("/state/velocity", f.state.velocity, "");
   const auto ensemble = [&](const char* name, std::int64_t value, std::int64_t least) {
     if (value < least || value > 10'000)
-      fail(std::string("/ensemble@") + name, std::to_string(value),
-           fmt::format("in {} … 10000", least));
+      fail(std::string("/ensemble@") + name, std::to_string(value), fmt::format("in {} … 10000", least));
   };
   ensemble("substeps", f.ensemble.substeps, 1);
   ensemble("members", f.ensemble.members, 2);
   for (std::size_t k = 0; k < f.ensemble.mean.size(); ++k)
-    for (const auto& [name, value] : {std::pair{"mean", f.ensemble.mean[k]},
-                                      std::pair{"deviation", f.ensemble.deviation[k]}})
+    for (const auto& [name, value] :
+         {std::pair{"mean", f.ensemble.mean[k]}, std::pair{"deviation", f.ensemble.deviation[k]}})
       if (!(value >= 0 && std::isfinite(value)))
-        fail(std::string("/ensemble/") + name, fmt::format("{:.9g} at {}", value, k),
-             "finite, >= 0");
+        fail(std::string("/ensemble/") + name, fmt::format("{:.9g} at {}", value, k), "finite, >= 0");
   if (f.fields) {
     if (!f.condition) fail("/condition", "missing", "required beside /oracle");
     for_each_field(*f.fields, check);
@@ -191,12 +177,10 @@ void check_fixture(const Fixture& f, Eigen::Index walls, const Fail& fail) {
   for (Eigen::Index k = 0; k < sampled; ++k) {
     const bool ascends = k == 0 || f.sample_id[k] > f.sample_id[k - 1];
     if (!ascends || f.sample_id[k] >= n)
-      fail("/sample/id", fmt::format("{} at {}", f.sample_id[k], k),
-           fmt::format("ascending, below {}", n));
+      fail("/sample/id", fmt::format("{} at {}", f.sample_id[k], k), fmt::format("ascending, below {}", n));
   }
   if (sampled == 0 && n > 0) fail("/sample/id", "0 values", "at least 1");
-  if (f.fields_digest.size() != 64)
-    fail("/sample@fields_sha256", f.fields_digest, "64 hexadecimal digits");
+  if (f.fields_digest.size() != 64) fail("/sample@fields_sha256", f.fields_digest, "64 hexadecimal digits");
 }
 
 Scene read_scene(const Hdf5Reader& in, const std::string& text) {
@@ -207,13 +191,11 @@ Scene read_scene(const Hdf5Reader& in, const std::string& text) {
     in.fail("/scene: " + error.key(), error.value(), error.bound());
   }
   if (scene.schedule.substeps_per_frame < 1)
-    in.fail("/scene: schedule.substeps_per_frame",
-            std::to_string(scene.schedule.substeps_per_frame), ">= 1");
+    in.fail("/scene: schedule.substeps_per_frame", std::to_string(scene.schedule.substeps_per_frame), ">= 1");
   const double estimate = wall_estimate(scene);
   if (!(estimate <= most_wall_particles))
     in.fail("/scene: particle_spacing", fmt::format("{:.3g}", scene.particle_spacing),
-            fmt::format("at most {:.0e} wall particles; about {:.1e} follow from it",
-                        most_wall_particles, estimate));
+            fmt::format("at most {:.0e} wall particles; about {:.1e} follow from it", most_wall_particles, estimate));
   return scene;
 }
 
@@ -228,8 +210,7 @@ Eigen::Index read_walls(const Hdf5Reader& in, const Scene& scene) {
   const std::int64_t count = in.integer_attribute("/walls", "count");
   const std::string digest = in.text_attribute("/walls", "sha256"), today = digest_of(walls);
   const std::string hint = "; wall sampling has changed, re-record the fixture";
-  if (count != walls.size())
-    in.fail("/walls@count", std::to_string(count), std::to_string(walls.size()) + hint);
+  if (count != walls.size()) in.fail("/walls@count", std::to_string(count), std::to_string(walls.size()) + hint);
   if (digest != today) in.fail("/walls@sha256", digest, today + hint);
   return walls.size();
 }
@@ -246,11 +227,11 @@ Divergence measures(const Eigen::VectorXd& values) {
 
 Fixture read_fixture(const std::filesystem::path& file) {
   const Hdf5Reader in(file);
-  const Fail fail = [&](const std::string& key, const std::string& value,
-                        const std::string& bound) { in.fail(key, value, bound); };
+  const Fail fail = [&](const std::string& key, const std::string& value, const std::string& bound) {
+    in.fail(key, value, bound);
+  };
   const std::int64_t schema = in.integer_attribute("/", "decant_fixture");
-  if (schema != fixture_schema)
-    fail("/@decant_fixture", std::to_string(schema), std::to_string(fixture_schema));
+  if (schema != fixture_schema) fail("/@decant_fixture", std::to_string(schema), std::to_string(fixture_schema));
 
   Fixture f;
   f.name = file.stem().string();
@@ -292,11 +273,9 @@ Fixture read_fixture(const std::filesystem::path& file) {
 
 void write_fixture(const std::filesystem::path& file, const Fixture& f) {
   const Walls walls = sample_walls(f.scene);
-  check_fixture(
-      f, walls.size(),
-      [&](const std::string& key, const std::string& value, const std::string& bound) {
-        throw std::runtime_error(fmt::format("{}: {} = {}: {}", file.string(), key, value, bound));
-      });
+  check_fixture(f, walls.size(), [&](const std::string& key, const std::string& value, const std::string& bound) {
+    throw std::runtime_error(fmt::format("{}: {} = {}: {}", file.string(), key, value, bound));
+  });
   const std::string scene_text = scene_to_json(f.scene);
 
   Hdf5Writer out(file, 9);
@@ -319,10 +298,8 @@ void write_fixture(const std::filesystem::path& file, const Fixture& f) {
   out.attribute("/ensemble", "substeps", f.ensemble.substeps);
   out.attribute("/ensemble", "members", f.ensemble.members);
   const auto measures_text = "rms_position (m), p99_position, rms_velocity (m/s), p99_velocity, energy (J)";
-  out.vector("/ensemble/mean", Eigen::Map<const Eigen::VectorXd>(f.ensemble.mean.data(), five), "",
-             measures_text);
-  out.vector("/ensemble/deviation",
-             Eigen::Map<const Eigen::VectorXd>(f.ensemble.deviation.data(), five), "",
+  out.vector("/ensemble/mean", Eigen::Map<const Eigen::VectorXd>(f.ensemble.mean.data(), five), "", measures_text);
+  out.vector("/ensemble/deviation", Eigen::Map<const Eigen::VectorXd>(f.ensemble.deviation.data(), five), "",
              measures_text);
   auto provenance = f.provenance;
   provenance["scene_sha256"] = sha256_of_text(scene_text);

@@ -19,8 +19,7 @@ struct CommonRoundings {
   double W, G;  // the kernels' norms
 
   explicit CommonRoundings(KernelFamily family)
-      : W(family == KernelFamily::mueller2003 ? 11 : 5),
-        G(family == KernelFamily::mueller2003 ? 8 : 7) {}
+      : W(family == KernelFamily::mueller2003 ? 11 : 5), G(family == KernelFamily::mueller2003 ? 8 : 7) {}
 };
 inline constexpr double of_mass = 4;
 // Inside a term: beside a distance's, and a distance's, by the term's condition.
@@ -52,8 +51,7 @@ struct ForceBounds {
   Vec3 tolerance(double tau_q, CellCounter& cells) const {
     Vec3 rounding;
     for (int c = 0; c < 3; ++c) rounding[c] = sum[c].error(both_roundoffs, both_roundoffs * inside[c], cells);
-    return rounding + pose + inputs + squares.cwiseSqrt() +
-           2 * tau_q * gradient.cwiseAbs();
+    return rounding + pose + inputs + squares.cwiseSqrt() + 2 * tau_q * gradient.cwiseAbs();
   }
   ForceBounds& operator+=(const ForceBounds& o) {
     for (int c = 0; c < 3; ++c) sum[c].add(o.sum[c]);

@@ -68,8 +68,7 @@ inline bool make_group(hid_t file, const std::string& path) {
   for (std::size_t end = 0; end != std::string::npos && path != "/";) {
     end = path.find('/', end + 1);
     const std::string part = path.substr(0, end);
-    if (!exists(file, part) &&
-        !Handle(H5Gcreate2(file, part.c_str(), H5P_DEFAULT, creation.get(), H5P_DEFAULT)))
+    if (!exists(file, part) && !Handle(H5Gcreate2(file, part.c_str(), H5P_DEFAULT, creation.get(), H5P_DEFAULT)))
       return false;
   }
   return true;

@@ -66,8 +66,7 @@ class Hdf5Reader {
 
   const std::filesystem::path& file() const { return file_; }
   /// Throws InputError(file, key, value, bound); for callers that find a value out of bounds.
-  [[noreturn]] void fail(const std::string& key, const std::string& value,
-                         const std::string& bound) const;
+  [[noreturn]] void fail(const std::string& key, const std::string& value, const std::string& bound) const;
 
  private:
   std::filesystem::path file_;
@@ -99,11 +98,9 @@ class Hdf5Writer {
   /// [n] int64.
   void integers(const std::string& path, const IdVector& values, std::string_view description = {});
   /// [n] uint8.
-  void bytes(const std::string& path, const std::vector<std::uint8_t>& values,
-             std::string_view description = {});
+  void bytes(const std::string& path, const std::vector<std::uint8_t>& values, std::string_view description = {});
   /// [n] fixed-length UTF-8; a string may not hold NUL.
-  void strings(const std::string& path, const std::vector<std::string>& values,
-               std::string_view description = {});
+  void strings(const std::string& path, const std::vector<std::string>& values, std::string_view description = {});
   /// Scalar fixed-length UTF-8.
   void text(const std::string& path, std::string_view text, std::string_view description = {});
   /// Makes a group where it is missing.
@@ -119,8 +116,7 @@ class Hdf5Writer {
     attribute(object, name, std::string_view(text));
   }
   /// [n] int64.
-  void attribute(const std::string& object, const std::string& name,
-                 const std::vector<std::int64_t>& values);
+  void attribute(const std::string& object, const std::string& name, const std::vector<std::int64_t>& values);
   /// Fixed-length ASCII, which some readers insist on.
   void ascii_attribute(const std::string& object, const std::string& name, std::string_view text);
   /// Writes to the disk and renames into place; the last call on a writer.
@@ -128,8 +124,8 @@ class Hdf5Writer {
 
  private:
   struct Layout;
-  void dataset(const std::string& path, const Layout& layout, const void* values,
-               std::string_view unit, std::string_view description);
+  void dataset(const std::string& path, const Layout& layout, const void* values, std::string_view unit,
+               std::string_view description);
   [[noreturn]] void fail(const std::string& object, const std::string& what) const;
 
   // Opened with the writer, so that a place that cannot be written is known before the work.

@@ -30,9 +30,7 @@ std::vector<hsize_t> extent_of(hid_t space) {
 }
 
 /// Refused everywhere: such strings lie in a heap that HDF5 1.10 walks for ever when it is damaged.
-bool is_variable_string(hid_t type) {
-  return H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) > 0;
-}
+bool is_variable_string(hid_t type) { return H5Tget_class(type) == H5T_STRING && H5Tis_variable_str(type) > 0; }
 
 std::string describe(hid_t type, const std::vector<hsize_t>& dims) {
   std::string kind;
@@ -70,8 +68,7 @@ bool read_strings(hid_t type, std::size_t count, const Read& read, std::vector<s
   std::vector<char> raw(count * size);
   if (read(type, raw.data()) < 0) return false;
   out.reserve(count);
-  for (std::size_t k = 0; k < count; ++k)
-    out.push_back(trimmed(raw.data() + k * size, size, H5Tget_strpad(type)));
+  for (std::size_t k = 0; k < count; ++k) out.push_back(trimmed(raw.data() + k * size, size, H5Tget_strpad(type)));
   return true;
 }
 
@@ -100,8 +97,8 @@ bool shuffled_and_deflated(hid_t plist) {
   for (int k = 0; k < H5Pget_nfilters(plist); ++k) {
     unsigned flags = 0, settings = 0;
     std::size_t values = 0;
-    const H5Z_filter_t filter = H5Pget_filter2(plist, static_cast<unsigned>(k), &flags, &values,
-                                               nullptr, 0, nullptr, &settings);
+    const H5Z_filter_t filter =
+        H5Pget_filter2(plist, static_cast<unsigned>(k), &flags, &values, nullptr, 0, nullptr, &settings);
     if (filter != H5Z_FILTER_SHUFFLE && filter != H5Z_FILTER_DEFLATE) return false;
   }
   return true;
@@ -109,8 +106,8 @@ bool shuffled_and_deflated(hid_t plist) {
 
 /// Inflates every chunk: HDF5 1.10 takes what comes out for a whole chunk and reads on behind a
 /// shorter one.
-void check_chunks(const Hdf5Reader& reader, const std::string& path, const Dataset& data,
-                  hid_t plist, hsize_t chunks, std::size_t chunk_bytes) {
+void check_chunks(const Hdf5Reader& reader, const std::string& path, const Dataset& data, hid_t plist, hsize_t chunks,
+                  std::size_t chunk_bytes) {
   if (!shuffled_and_deflated(plist)) reader.fail(path, "another filter", "shuffle and deflate");
   std::error_code ignored;
   const std::uintmax_t file_size = std::filesystem::file_size(reader.file(), ignored);
@@ -121,18 +118,16 @@ void check_chunks(const Hdf5Reader& reader, const std::string& path, const Datas
     haddr_t address = 0;
     hsize_t size = 0;
     uLongf produced = inflated.size();
-    bool whole = H5Dget_chunk_info(data.id.get(), data.space.get(), k, offset.data(),
-                                   &skipped_filters, &address, &size) >= 0 &&
-                 skipped_filters == 0 && size <= file_size;
+    bool whole =
+        H5Dget_chunk_info(data.id.get(), data.space.get(), k, offset.data(), &skipped_filters, &address, &size) >= 0 &&
+        skipped_filters == 0 && size <= file_size;
     if (whole) {
       stored.resize(size);
       std::uint32_t mask = 0;
       whole = H5Dread_chunk(data.id.get(), H5P_DEFAULT, offset.data(), &mask, stored.data()) >= 0 &&
-              uncompress(inflated.data(), &produced, stored.data(), stored.size()) == Z_OK &&
-              produced == chunk_bytes;
+              uncompress(inflated.data(), &produced, stored.data(), stored.size()) == Z_OK && produced == chunk_bytes;
     }
-    if (!whole)
-      reader.fail(path, fmt::format("chunk {} of {}", k, chunks), "whole; the file is damaged");
+    if (!whole) reader.fail(path, fmt::format("chunk {} of {}", k, chunks), "whole; the file is damaged");
   }
 }
 
@@ -153,8 +148,7 @@ void check_storage(const Hdf5Reader& reader, const std::string& path, const Data
   const bool never_written = held == 0;
   if (never_written || !(claimed <= std::max(held, layout == H5D_CHUNKED ? free_claim : 0)))
     reader.fail(path, describe(data.type.get(), data.dims),
-                fmt::format("its values in the file; {} bytes are there",
-                            H5Dget_storage_size(data.id.get())));
+                fmt::format("its values in the file; {} bytes are there", H5Dget_storage_size(data.id.get())));
   if (layout != H5D_CHUNKED) return;
 
   std::vector<hsize_t> chunk(data.dims.size());
@@ -169,16 +163,15 @@ void check_storage(const Hdf5Reader& reader, const std::string& path, const Data
   if (!(static_cast<double>(chunks) >= expected))
     reader.fail(path, fmt::format("{} chunks", chunks), fmt::format("{:.0f} chunks", expected));
   if (!(chunk_bytes <= std::max(claimed, free_claim)))
-    reader.fail(path, fmt::format("chunks of {:.0f} bytes", chunk_bytes),
-                "chunks no larger than the dataset");
+    reader.fail(path, fmt::format("chunks of {:.0f} bytes", chunk_bytes), "chunks no larger than the dataset");
   if (H5Pget_nfilters(plist.get()) > 0)
     check_chunks(reader, path, data, plist.get(), chunks, static_cast<std::size_t>(chunk_bytes));
 }
 
 /// Opens a dataset and holds it to class, rank, first extent (n >= 0) and, of vectors beyond rank 1, a
 /// last extent of 3.
-Dataset open_dataset(const Hdf5Reader& reader, hid_t file, const std::string& path,
-                     H5T_class_t kind, std::size_t rank, std::int64_t n, bool vectors = true) {
+Dataset open_dataset(const Hdf5Reader& reader, hid_t file, const std::string& path, H5T_class_t kind, std::size_t rank,
+                     std::int64_t n, bool vectors = true) {
   Handle object = open_object(reader, file, path);
   if (H5Iget_type(object.get()) != H5I_DATASET) reader.fail(path, "a group", "a dataset");
   Dataset data{std::move(object), Handle(-1), Handle(-1), {}};
@@ -188,8 +181,7 @@ Dataset open_dataset(const Hdf5Reader& reader, hid_t file, const std::string& pa
   data.dims = extent_of(data.space.get());
 
   const bool fits = H5Tget_class(data.type.get()) == kind && !is_variable_string(data.type.get()) &&
-                    data.dims.size() == rank &&
-                    H5Sget_simple_extent_type(data.space.get()) != H5S_NULL &&
+                    data.dims.size() == rank && H5Sget_simple_extent_type(data.space.get()) != H5S_NULL &&
                     (rank < 1 || n < 0 || data.dims[0] == static_cast<hsize_t>(n)) &&
                     (rank < 2 || !vectors || data.dims.back() == 3);
   if (!fits) {
@@ -206,24 +198,20 @@ Dataset open_dataset(const Hdf5Reader& reader, hid_t file, const std::string& pa
   return data;
 }
 
-void read_all(const Hdf5Reader& reader, const std::string& path, const Dataset& data, hid_t memory,
-              void* out) {
+void read_all(const Hdf5Reader& reader, const std::string& path, const Dataset& data, hid_t memory, void* out) {
   if (data.count == 0) return;
   if (H5Dread(data.id.get(), memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, out) < 0)
     reader.fail(path, hdf5_message(), "readable; the file is damaged");
 }
 
-std::string attribute_key(const std::string& object, const std::string& name) {
-  return object + "@" + name;
-}
+std::string attribute_key(const std::string& object, const std::string& name) { return object + "@" + name; }
 
 struct Attribute {
   Handle id, type, space;
 };
 
-Attribute open_attribute(const Hdf5Reader& reader, hid_t file, const std::string& object,
-                         const std::string& name, bool (*takes)(H5T_class_t),
-                         const std::string& expected) {
+Attribute open_attribute(const Hdf5Reader& reader, hid_t file, const std::string& object, const std::string& name,
+                         bool (*takes)(H5T_class_t), const std::string& expected) {
   const std::string key = attribute_key(object, name);
   const Handle owner = open_object(reader, file, object);
   if (!(H5Aexists(owner.get(), name.c_str()) > 0)) reader.fail(key, "missing", expected);
@@ -247,8 +235,7 @@ Hdf5Reader::Hdf5Reader(std::filesystem::path file) : file_(std::move(file)) {
   const auto status = std::filesystem::status(file_, error);
   if (!std::filesystem::exists(status)) fail("file", "not found", expected);
   if (!std::filesystem::is_regular_file(status))
-    fail("file", std::filesystem::is_directory(status) ? "a folder" : "not a regular file",
-         expected);
+    fail("file", std::filesystem::is_directory(status) ? "a folder" : "not a regular file", expected);
   if (std::filesystem::file_size(file_, error) == 0) fail("file", "empty", expected);
 
   const Handle access(H5Pcreate(H5P_FILE_ACCESS));
@@ -260,8 +247,7 @@ Hdf5Reader::Hdf5Reader(std::filesystem::path file) : file_(std::move(file)) {
   H5F_info2_t info;
   if (H5Fget_info2(id_, &info) < 0 || info.super.version < 2) {
     H5Fclose(std::exchange(id_, -1));
-    fail("file", "in HDF5's format without checksums",
-         "of HDF5 1.8 or later (h5py: libver=\"v108\")");
+    fail("file", "in HDF5's format without checksums", "of HDF5 1.8 or later (h5py: libver=\"v108\")");
   }
 }
 
@@ -269,8 +255,7 @@ Hdf5Reader::~Hdf5Reader() {
   if (id_ >= 0) H5Fclose(id_);
 }
 
-void Hdf5Reader::fail(const std::string& key, const std::string& value,
-                      const std::string& bound) const {
+void Hdf5Reader::fail(const std::string& key, const std::string& value, const std::string& bound) const {
   throw InputError(file_.string(), key, value, bound);
 }
 
@@ -284,8 +269,7 @@ std::vector<std::string> Hdf5Reader::children(const std::string& group) const {
   std::vector<std::string> names;
   for (hsize_t k = 0; k < info.nlinks; ++k) {
     char name[256];
-    if (H5Lget_name_by_idx(object.get(), ".", H5_INDEX_NAME, H5_ITER_INC, k, name, sizeof name,
-                           H5P_DEFAULT) < 0)
+    if (H5Lget_name_by_idx(object.get(), ".", H5_INDEX_NAME, H5_ITER_INC, k, name, sizeof name, H5P_DEFAULT) < 0)
       fail(group, hdf5_message(), "readable; the file is damaged");
     names.emplace_back(name);
   }
@@ -325,8 +309,8 @@ namespace {
 
 /// Entry `index` of a [T,n] or [T,n,3] dataset, as columns of `values`.
 template <class Matrix>
-Matrix read_entry(const Hdf5Reader& reader, const std::string& path, const Dataset& data,
-                  std::int64_t index, hid_t memory_type, Matrix values) {
+Matrix read_entry(const Hdf5Reader& reader, const std::string& path, const Dataset& data, std::int64_t index,
+                  hid_t memory_type, Matrix values) {
   if (index < 0 || static_cast<hsize_t>(index) >= data.dims[0])
     reader.fail(path, describe(data.type.get(), data.dims), fmt::format("to hold entry {}", index));
   const auto rank = static_cast<int>(data.dims.size());
@@ -335,8 +319,8 @@ Matrix read_entry(const Hdf5Reader& reader, const std::string& path, const Datas
   const hsize_t start[3] = {static_cast<hsize_t>(index), 0, 0}, count[3] = {1, data.dims[1], 3};
   const Handle memory(H5Screate_simple(rank, count, nullptr));
   H5Sselect_hyperslab(data.space.get(), H5S_SELECT_SET, start, nullptr, count, nullptr);
-  if (values.size() > 0 && H5Dread(data.id.get(), memory_type, memory.get(), data.space.get(),
-                                   H5P_DEFAULT, values.data()) < 0)
+  if (values.size() > 0 &&
+      H5Dread(data.id.get(), memory_type, memory.get(), data.space.get(), H5P_DEFAULT, values.data()) < 0)
     reader.fail(path, hdf5_message(), "readable; the file is damaged");
   return values;
 }
@@ -344,25 +328,24 @@ Matrix read_entry(const Hdf5Reader& reader, const std::string& path, const Datas
 }  // namespace
 
 Eigen::Matrix3Xd Hdf5Reader::matrix3_at(const std::string& path, std::int64_t index) const {
-  return read_entry(*this, path, open_dataset(*this, id_, path, H5T_FLOAT, 3, -1), index,
-                    H5T_NATIVE_DOUBLE, Eigen::Matrix3Xd());
+  return read_entry(*this, path, open_dataset(*this, id_, path, H5T_FLOAT, 3, -1), index, H5T_NATIVE_DOUBLE,
+                    Eigen::Matrix3Xd());
 }
 
 Eigen::VectorXd Hdf5Reader::vector_at(const std::string& path, std::int64_t index) const {
-  return read_entry(*this, path, open_dataset(*this, id_, path, H5T_FLOAT, 2, -1, false), index,
-                    H5T_NATIVE_DOUBLE, Eigen::VectorXd());
+  return read_entry(*this, path, open_dataset(*this, id_, path, H5T_FLOAT, 2, -1, false), index, H5T_NATIVE_DOUBLE,
+                    Eigen::VectorXd());
 }
 
 IdVector Hdf5Reader::integers_at(const std::string& path, std::int64_t index) const {
-  return read_entry(*this, path, open_dataset(*this, id_, path, H5T_INTEGER, 2, -1, false), index,
-                    H5T_NATIVE_INT64, IdVector());
+  return read_entry(*this, path, open_dataset(*this, id_, path, H5T_INTEGER, 2, -1, false), index, H5T_NATIVE_INT64,
+                    IdVector());
 }
 
 IdVector Hdf5Reader::integers(const std::string& path, std::int64_t n) const {
   const Dataset data = open_dataset(*this, id_, path, H5T_INTEGER, 1, n);
   IdVector values(static_cast<Eigen::Index>(data.count));
-  const bool wide =
-      H5Tget_size(data.type.get()) >= 8 && H5Tget_sign(data.type.get()) == H5T_SGN_NONE;
+  const bool wide = H5Tget_size(data.type.get()) >= 8 && H5Tget_sign(data.type.get()) == H5T_SGN_NONE;
   // HDF5 would clip what int64 does not hold; read as unsigned, such a value turns negative.
   read_all(*this, path, data, wide ? H5T_NATIVE_UINT64 : H5T_NATIVE_INT64, values.data());
   if (wide && values.size() > 0 && values.minCoeff() < 0)
@@ -387,8 +370,7 @@ std::string Hdf5Reader::text(const std::string& path) const {
   const auto read = [&](hid_t type, void* out) {
     return H5Dread(data.id.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, out);
   };
-  if (!read_strings(data.type.get(), 1, read, values))
-    fail(path, hdf5_message(), "readable; the file is damaged");
+  if (!read_strings(data.type.get(), 1, read, values)) fail(path, hdf5_message(), "readable; the file is damaged");
   return values.front();
 }
 
@@ -411,9 +393,8 @@ bool Hdf5Reader::has_attribute(const std::string& object, const std::string& nam
 }
 
 std::string Hdf5Reader::text_attribute(const std::string& object, const std::string& name) const {
-  const Attribute a = open_attribute(
-      *this, id_, object, name, [](H5T_class_t c) { return c == H5T_STRING; },
-      "a fixed-length string");
+  const Attribute a =
+      open_attribute(*this, id_, object, name, [](H5T_class_t c) { return c == H5T_STRING; }, "a fixed-length string");
   std::vector<std::string> values;
   const auto read = [&](hid_t type, void* out) { return H5Aread(a.id.get(), type, out); };
   if (!read_strings(a.type.get(), 1, read, values))
@@ -423,18 +404,16 @@ std::string Hdf5Reader::text_attribute(const std::string& object, const std::str
 
 double Hdf5Reader::real_attribute(const std::string& object, const std::string& name) const {
   const Attribute a = open_attribute(
-      *this, id_, object, name, [](H5T_class_t c) { return c == H5T_FLOAT || c == H5T_INTEGER; },
-      "a real number");
+      *this, id_, object, name, [](H5T_class_t c) { return c == H5T_FLOAT || c == H5T_INTEGER; }, "a real number");
   double value = std::numeric_limits<double>::quiet_NaN();
   if (H5Aread(a.id.get(), H5T_NATIVE_DOUBLE, &value) < 0)
     fail(attribute_key(object, name), hdf5_message(), "readable; the file is damaged");
   return value;
 }
 
-std::int64_t Hdf5Reader::integer_attribute(const std::string& object,
-                                           const std::string& name) const {
-  const Attribute a = open_attribute(
-      *this, id_, object, name, [](H5T_class_t c) { return c == H5T_INTEGER; }, "an integer");
+std::int64_t Hdf5Reader::integer_attribute(const std::string& object, const std::string& name) const {
+  const Attribute a =
+      open_attribute(*this, id_, object, name, [](H5T_class_t c) { return c == H5T_INTEGER; }, "an integer");
   std::int64_t value = 0;
   if (H5Aread(a.id.get(), H5T_NATIVE_INT64, &value) < 0)
     fail(attribute_key(object, name), hdf5_message(), "readable; the file is damaged");

@@ -31,8 +31,7 @@ struct Hdf5Writer::Layout {
   std::vector<hsize_t> dims;
 };
 
-Hdf5Writer::Hdf5Writer(std::filesystem::path file, int level)
-    : out_(std::move(file)), level_(level) {
+Hdf5Writer::Hdf5Writer(std::filesystem::path file, int level) : out_(std::move(file)), level_(level) {
   silence_hdf5();
   // In memory until commit: HDF5 1.10 crashes when a disk is full.
   const Handle access(H5Pcreate(H5P_FILE_ACCESS));
@@ -46,16 +45,14 @@ Hdf5Writer::~Hdf5Writer() {
 }
 
 void Hdf5Writer::fail(const std::string& object, const std::string& what) const {
-  throw std::runtime_error(
-      fmt::format("{}: {}: cannot be written: {}", out_.file().string(), object, what));
+  throw std::runtime_error(fmt::format("{}: {}: cannot be written: {}", out_.file().string(), object, what));
 }
 
-void Hdf5Writer::dataset(const std::string& path, const Layout& layout, const void* values,
-                         std::string_view unit, std::string_view description) {
+void Hdf5Writer::dataset(const std::string& path, const Layout& layout, const void* values, std::string_view unit,
+                         std::string_view description) {
   const auto& dims = layout.dims;
-  const Handle space(dims.empty()
-                         ? H5Screate(H5S_SCALAR)
-                         : H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr));
+  const Handle space(dims.empty() ? H5Screate(H5S_SCALAR)
+                                  : H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr));
   const bool holds_values = std::find(dims.begin(), dims.end(), hsize_t{0}) == dims.end();
   const Handle creation(H5Pcreate(H5P_DATASET_CREATE));
   H5Pset_obj_track_times(creation.get(), false);
@@ -67,44 +64,39 @@ void Hdf5Writer::dataset(const std::string& path, const Layout& layout, const vo
     H5Pset_deflate(creation.get(), static_cast<unsigned>(level_));
   }
   group(parent_path(path));
-  const Handle data(H5Dcreate2(id_, path.c_str(), layout.file_type, space.get(), H5P_DEFAULT,
-                               creation.get(), H5P_DEFAULT));
+  const Handle data(
+      H5Dcreate2(id_, path.c_str(), layout.file_type, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT));
   if (!data) fail(path, hdf5_message());
-  if (holds_values &&
-      H5Dwrite(data.get(), layout.memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0)
+  if (holds_values && H5Dwrite(data.get(), layout.memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0)
     fail(path, hdf5_message());
   if (!unit.empty()) attribute(path, "unit", unit);
   if (!description.empty()) attribute(path, "description", description);
 }
 
-void Hdf5Writer::vector(const std::string& path, const Eigen::VectorXd& values,
-                        std::string_view unit, std::string_view description, Storage storage) {
+void Hdf5Writer::vector(const std::string& path, const Eigen::VectorXd& values, std::string_view unit,
+                        std::string_view description, Storage storage) {
   const std::vector<hsize_t> dims = {static_cast<hsize_t>(values.size())};
   if (storage == Storage::fp64)
-    return dataset(path, {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, dims}, values.data(), unit,
-                   description);
+    return dataset(path, {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, dims}, values.data(), unit, description);
   const Eigen::VectorXf single = values.cast<float>();
   dataset(path, {H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, dims}, single.data(), unit, description);
 }
 
-void Hdf5Writer::matrix3(const std::string& path, const Eigen::Matrix3Xd& values,
-                         std::string_view unit, std::string_view description, Storage storage) {
+void Hdf5Writer::matrix3(const std::string& path, const Eigen::Matrix3Xd& values, std::string_view unit,
+                         std::string_view description, Storage storage) {
   const std::vector<hsize_t> dims = {static_cast<hsize_t>(values.cols()), 3};
   if (storage == Storage::fp64)
-    return dataset(path, {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, dims}, values.data(), unit,
-                   description);
+    return dataset(path, {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, dims}, values.data(), unit, description);
   const Eigen::Matrix3Xf single = values.cast<float>();
   dataset(path, {H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, dims}, single.data(), unit, description);
 }
 
-void Hdf5Writer::integers(const std::string& path, const IdVector& values,
-                          std::string_view description) {
-  dataset(path, {H5T_STD_I64LE, H5T_NATIVE_INT64, {static_cast<hsize_t>(values.size())}},
-          values.data(), {}, description);
+void Hdf5Writer::integers(const std::string& path, const IdVector& values, std::string_view description) {
+  dataset(path, {H5T_STD_I64LE, H5T_NATIVE_INT64, {static_cast<hsize_t>(values.size())}}, values.data(), {},
+          description);
 }
 
-void Hdf5Writer::bytes(const std::string& path, const std::vector<std::uint8_t>& values,
-                       std::string_view description) {
+void Hdf5Writer::bytes(const std::string& path, const std::vector<std::uint8_t>& values, std::string_view description) {
   dataset(path, {H5T_STD_U8LE, H5T_NATIVE_UINT8, {values.size()}}, values.data(), {}, description);
 }
 
@@ -117,14 +109,12 @@ void Hdf5Writer::strings(const std::string& path, const std::vector<std::string>
   }
   std::vector<char> padded(values.size() * size, '\0');
   for (std::size_t k = 0; k < values.size(); ++k)
-    std::copy(values[k].begin(), values[k].end(),
-              padded.begin() + static_cast<std::ptrdiff_t>(k * size));
+    std::copy(values[k].begin(), values[k].end(), padded.begin() + static_cast<std::ptrdiff_t>(k * size));
   const Handle type = utf8_type(size);
   dataset(path, {type.get(), type.get(), {values.size()}}, padded.data(), {}, description);
 }
 
-void Hdf5Writer::text(const std::string& path, std::string_view text,
-                      std::string_view description) {
+void Hdf5Writer::text(const std::string& path, std::string_view text, std::string_view description) {
   if (text.find('\0') != std::string_view::npos) fail(path, "a string holds NUL");
   const std::string whole = text.empty() ? std::string(1, '\0') : std::string(text);
   const Handle type = utf8_type(whole.size());
@@ -139,20 +129,18 @@ namespace {
 
 /// Writes one attribute of what stands at a path, a scalar where no length is given; false where
 /// HDF5 refuses.
-bool write_attribute(hid_t file, const std::string& object, const std::string& name, hid_t type,
-                     hid_t memory, const void* value, hsize_t length = 0) {
+bool write_attribute(hid_t file, const std::string& object, const std::string& name, hid_t type, hid_t memory,
+                     const void* value, hsize_t length = 0) {
   const Handle owner(H5Oopen(file, object.c_str(), H5P_DEFAULT));
   const Handle space(length > 0 ? H5Screate_simple(1, &length, nullptr) : H5Screate(H5S_SCALAR));
   if (!owner) return false;
-  const Handle attribute(
-      H5Acreate2(owner.get(), name.c_str(), type, space.get(), H5P_DEFAULT, H5P_DEFAULT));
+  const Handle attribute(H5Acreate2(owner.get(), name.c_str(), type, space.get(), H5P_DEFAULT, H5P_DEFAULT));
   return attribute && H5Awrite(attribute.get(), memory, value) >= 0;
 }
 
 }  // namespace
 
-void Hdf5Writer::attribute(const std::string& object, const std::string& name,
-                           std::string_view text) {
+void Hdf5Writer::attribute(const std::string& object, const std::string& name, std::string_view text) {
   const std::string whole = text.empty() ? std::string(1, '\0') : std::string(text);
   if (text.find('\0') != std::string_view::npos) fail(object + "@" + name, "a string holds NUL");
   const Handle type = utf8_type(whole.size());
@@ -176,13 +164,11 @@ void Hdf5Writer::attribute(const std::string& object, const std::string& name, s
 void Hdf5Writer::attribute(const std::string& object, const std::string& name,
                            const std::vector<std::int64_t>& values) {
   group(object);
-  if (!write_attribute(id_, object, name, H5T_STD_I64LE, H5T_NATIVE_INT64, values.data(),
-                       values.size()))
+  if (!write_attribute(id_, object, name, H5T_STD_I64LE, H5T_NATIVE_INT64, values.data(), values.size()))
     fail(object + "@" + name, hdf5_message());
 }
 
-void Hdf5Writer::ascii_attribute(const std::string& object, const std::string& name,
-                                 std::string_view text) {
+void Hdf5Writer::ascii_attribute(const std::string& object, const std::string& name, std::string_view text) {
   const Handle type(H5Tcopy(H5T_C_S1));
   H5Tset_size(type.get(), text.size());
   H5Tset_strpad(type.get(), H5T_STR_NULLPAD);
@@ -194,10 +180,9 @@ void Hdf5Writer::ascii_attribute(const std::string& object, const std::string& n
 void Hdf5Writer::commit() {
   // The driver's own memory: H5Fget_file_image clears a flag and leaves its checksum as it was.
   void* memory = nullptr;
-  const ssize_t size =
-      H5Fflush(id_, H5F_SCOPE_GLOBAL) < 0 || H5Fget_vfd_handle(id_, H5P_DEFAULT, &memory) < 0
-          ? -1
-          : H5Fget_file_image(id_, nullptr, 0);
+  const ssize_t size = H5Fflush(id_, H5F_SCOPE_GLOBAL) < 0 || H5Fget_vfd_handle(id_, H5P_DEFAULT, &memory) < 0
+                           ? -1
+                           : H5Fget_file_image(id_, nullptr, 0);
   if (size < 0) fail("file", hdf5_message());
   out_.write({*static_cast<const char**>(memory), static_cast<std::size_t>(size)});
   out_.commit();

@@ -24,8 +24,8 @@ class EdgeIntegrals {
     const Kernel<double> kernel(scene.kernel, H);
     table_.resize(steps + 1);
     for (std::size_t k = 0; k < steps; ++k) {
-      const double r = H * (1 - (static_cast<double>(k) + 0.5) / steps), W = kernel.W(r),
-                   G = r * kernel.G(r), L = kernel.L(r);
+      const double r = H * (1 - (static_cast<double>(k) + 0.5) / steps), W = kernel.W(r), G = r * kernel.G(r),
+                   L = kernel.L(r);
       Values next = table_[k];
       next.WW += W * W / steps;
       next.GG += G * G / steps;
@@ -40,8 +40,7 @@ class EdgeIntegrals {
     const auto k = std::min(static_cast<std::size_t>(place), std::size_t{steps - 1});
     const double t = place - static_cast<double>(k);
     const Values &a = table_[k], &b = table_[k + 1];
-    return {a.WW + t * (b.WW - a.WW), a.GG + t * (b.GG - a.GG), a.LL + t * (b.LL - a.LL),
-            a.GL + t * (b.GL - a.GL)};
+    return {a.WW + t * (b.WW - a.WW), a.GG + t * (b.GG - a.GG), a.LL + t * (b.LL - a.LL), a.GL + t * (b.GL - a.GL)};
   }
 
  private:
@@ -49,8 +48,7 @@ class EdgeIntegrals {
   std::vector<Values> table_;
 };
 
-ExpectedDrift expected(const EdgeIntegrals& edge, const PairsNearEdge& near, double seconds,
-                       double skin) {
+ExpectedDrift expected(const EdgeIntegrals& edge, const PairsNearEdge& near, double seconds, double skin) {
   double missed = 0, density = 0, acceleration = 0;
   for (const NearPair& pair : near.pairs) {
     const double x = pair.approach * seconds - skin;
@@ -59,8 +57,7 @@ ExpectedDrift expected(const EdgeIntegrals& edge, const PairsNearEdge& near, dou
     missed += x;
     density += pair.mass * pair.mass * I.WW;
     acceleration += pair.pressure * pair.pressure * I.GG + pair.viscous * pair.viscous * I.LL +
-                    2 * pair.pressure * pair.viscous * pair.cosine * I.GL +
-                    pair.handed_on * pair.handed_on * I.WW;
+                    2 * pair.pressure * pair.viscous * pair.cosine * I.GL + pair.handed_on * pair.handed_on * I.WW;
   }
   // Each pair in the shell stands for 1/(2 width) pairs a unit of r/H.
   const double each = 1 / (2 * PairsNearEdge::width * std::max(near.particles, 1.0));
@@ -74,10 +71,9 @@ ExpectedDrift expected(const EdgeIntegrals& edge, const PairsNearEdge& near, dou
 
 }  // namespace
 
-PairsNearEdge pairs_near_edge(const Scene& scene, const Eigen::VectorXd& volumes,
-                              const Instant& now) {
-  const double H = scene.support_radius(), m = scene.particle_mass(),
-               rho0 = scene.fluid.rest_density, c0 = scene.fluid.sound_speed;
+PairsNearEdge pairs_near_edge(const Scene& scene, const Eigen::VectorXd& volumes, const Instant& now) {
+  const double H = scene.support_radius(), m = scene.particle_mass(), rho0 = scene.fluid.rest_density,
+               c0 = scene.fluid.sound_speed;
   const Kernel<double> kernel(scene.kernel, H);
   const Separation separation(scene.domain);
   const auto& state = now.state;
@@ -93,23 +89,19 @@ PairsNearEdge pairs_near_edge(const Scene& scene, const Eigen::VectorXd& volumes
     return now.fields.pressure[i] / (now.fields.density[i] * now.fields.density[i]);
   };
   // dp/drho is about c0²; where pressure is clamped, density changes nothing.
-  const auto stiff = [&](Eigen::Index i) {
-    return now.fields.pressure[i] != 0 ? c0 * c0 / (rho0 * rho0) : 0.0;
-  };
+  const auto stiff = [&](Eigen::Index i) { return now.fields.pressure[i] != 0 ? c0 * c0 / (rho0 * rho0) : 0.0; };
   for (Eigen::Index i = 0; i < n; ++i) {
     const Vec3 x_i = state.position.col(i), v_i = state.velocity.col(i);
     const double rho_i = now.fields.density[i];
     Vec3 own = Vec3::Zero();
     double others = 0;
     const std::size_t first = near.pairs.size();
-    const auto take = [&](const Vec3& x_ij, const Vec3& v_ij, double mass, double pressure,
-                          double viscous) {
+    const auto take = [&](const Vec3& x_ij, const Vec3& v_ij, double mass, double pressure, double viscous) {
       const double r = x_ij.norm();
       if (r < H) own += mass * kernel.G(r) * x_ij;
       if (r < (1 - PairsNearEdge::width) * H || r == 0) return;
       const double nearing = -v_ij.dot(x_ij) / r, speed = v_ij.norm();
-      near.pairs.push_back({nearing / H, mass, pressure, viscous * speed,
-                            speed > 0 ? nearing / speed : 0.0, 0.0});
+      near.pairs.push_back({nearing / H, mass, pressure, viscous * speed, speed > 0 ? nearing / speed : 0.0, 0.0});
     };
     const auto at = static_cast<std::size_t>(i);
     for (const auto id : around.fluid[at]) {
@@ -121,37 +113,30 @@ PairsNearEdge pairs_near_edge(const Scene& scene, const Eigen::VectorXd& volumes
     }
     for (const auto id : around.wall[at]) {
       const auto b = static_cast<Eigen::Index>(id);
-      take(separation(x_i, Vec3(now.walls.position.col(b))), v_i - now.walls.velocity.col(b),
-           rho0 * volumes[b], rho0 * volumes[b] * q(i),
-           scene.fluid.wall_viscosity / rho_i * volumes[b]);
+      take(separation(x_i, Vec3(now.walls.position.col(b))), v_i - now.walls.velocity.col(b), rho0 * volumes[b],
+           rho0 * volumes[b] * q(i), scene.fluid.wall_viscosity / rho_i * volumes[b]);
     }
     const double handed_on = stiff(i) * std::sqrt(own.squaredNorm() + others);
-    for (std::size_t k = first; k < near.pairs.size(); ++k)
-      near.pairs[k].handed_on = handed_on * near.pairs[k].mass;
+    for (std::size_t k = first; k < near.pairs.size(); ++k) near.pairs[k].handed_on = handed_on * near.pairs[k].mass;
     near.neighbors += static_cast<double>(now.near.fluid[at].size() + now.near.wall[at].size());
     const double speed = v_i.norm();
     near.second = std::max(near.second, std::min(speed, near.fastest));
     near.fastest = std::max(near.fastest, speed);
   }
-  if (now.walls.velocity.cols() > 0)
-    near.wall_fastest = now.walls.velocity.colwise().norm().maxCoeff();
+  if (now.walls.velocity.cols() > 0) near.wall_fastest = now.walls.velocity.colwise().norm().maxCoeff();
   near.neighbors /= std::max(near.particles, 1.0);
   near.density_rms = rms(now.fields.density.squaredNorm(), near.particles);
-  near.acceleration_rms = rms(
-      (now.fields.acceleration - scene.gravity.replicate(1, n)).squaredNorm(), near.particles);
+  near.acceleration_rms = rms((now.fields.acceleration - scene.gravity.replicate(1, n)).squaredNorm(), near.particles);
   return near;
 }
 
-ExpectedDrift expected_drift(const Scene& scene, const PairsNearEdge& near, double seconds,
-                             double skin) {
+ExpectedDrift expected_drift(const Scene& scene, const PairsNearEdge& near, double seconds, double skin) {
   return expected(EdgeIntegrals(scene), near, seconds, skin);
 }
 
 double skin_for(const Scene& scene, const PairsNearEdge& near, double seconds, double tolerance) {
   const EdgeIntegrals edge(scene);
-  const auto within = [&](double skin) {
-    return expected(edge, near, seconds, skin).acceleration_rms <= tolerance;
-  };
+  const auto within = [&](double skin) { return expected(edge, near, seconds, skin).acceleration_rms <= tolerance; };
   if (within(0)) return 0;
   double low = 0, high = 1;
   for (int k = 0; k < 30; ++k) {
@@ -161,10 +146,8 @@ double skin_for(const Scene& scene, const PairsNearEdge& near, double seconds, d
   return high;
 }
 
-int expected_safe_interval(const Scene& scene, const PairsNearEdge& near, double skin,
-                           bool relative, int longest) {
-  double nearing = std::max(near.fastest + near.second, near.fastest + near.wall_fastest) /
-                   scene.support_radius();
+int expected_safe_interval(const Scene& scene, const PairsNearEdge& near, double skin, bool relative, int longest) {
+  double nearing = std::max(near.fastest + near.second, near.fastest + near.wall_fastest) / scene.support_radius();
   if (relative) {
     nearing = 0;
     for (const NearPair& pair : near.pairs) nearing = std::max(nearing, pair.approach);

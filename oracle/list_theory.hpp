@@ -25,22 +25,22 @@ namespace decant {
 
 /// A pair whose distance is near H.
 struct NearPair {
-  double approach = 0;  // 1/s, speed at which it comes nearer, over H; negative: it parts
-  double mass = 0;      // kg, m or rho0 V_b: times W its share of the density
-  double pressure = 0;  // times r G its pressure term, m/s²
-  double viscous = 0;   // times L its viscous term, m/s²
-  double cosine = 0;    // between the two terms
+  double approach = 0;   // 1/s, speed at which it comes nearer, over H; negative: it parts
+  double mass = 0;       // kg, m or rho0 V_b: times W its share of the density
+  double pressure = 0;   // times r G its pressure term, m/s²
+  double viscous = 0;    // times L its viscous term, m/s²
+  double cosine = 0;     // between the two terms
   double handed_on = 0;  // times W what its share of the density, missing, does to accelerations by way of
                          // pressure: of the particle and of its neighbors, together, m/s²
 };
 
 /// The pairs near H of one state, and what their deficits are compared with.
 struct PairsNearEdge {
-  std::vector<NearPair> pairs;     // fluid with fluid in both directions, and fluid with wall
+  std::vector<NearPair> pairs;  // fluid with fluid in both directions, and fluid with wall
   double particles = 0;
-  double neighbors = 0;            // within H, a particle; walls included
-  double density_rms = 0;          // kg/m³
-  double acceleration_rms = 0;     // m/s², without gravity
+  double neighbors = 0;                              // within H, a particle; walls included
+  double density_rms = 0;                            // kg/m³
+  double acceleration_rms = 0;                       // m/s², without gravity
   double fastest = 0, second = 0, wall_fastest = 0;  // m/s
 
   /// Half the thickness of the shell around H, over H.
@@ -48,8 +48,7 @@ struct PairsNearEdge {
 };
 
 /// \param now  a state with its true neighbors and fields; \param volumes  M, m³
-PairsNearEdge pairs_near_edge(const Scene& scene, const Eigen::VectorXd& volumes,
-                              const Instant& now);
+PairsNearEdge pairs_near_edge(const Scene& scene, const Eigen::VectorXd& volumes, const Instant& now);
 
 /// A list's errors, mean over particles.
 struct ExpectedDrift {
@@ -59,8 +58,7 @@ struct ExpectedDrift {
 };
 
 /// What a list with that skin misses `seconds` after its build.
-ExpectedDrift expected_drift(const Scene& scene, const PairsNearEdge& near, double seconds,
-                             double skin);
+ExpectedDrift expected_drift(const Scene& scene, const PairsNearEdge& near, double seconds, double skin);
 
 /// The smallest skin (share of H, at most 1) with which the acceleration stays within `tolerance`
 /// (relative RMS) until `seconds` after the build; 1 where none does.
@@ -70,8 +68,7 @@ double skin_for(const Scene& scene, const PairsNearEdge& near, double seconds, d
 /// intervals: a list used for N substeps is N − 1 old at its last. At most `longest`.
 /// \param relative  false: by the fastest particles, as the displacement bound does; true: by the pair
 /// near H that approaches fastest
-int expected_safe_interval(const Scene& scene, const PairsNearEdge& near, double skin,
-                           bool relative, int longest);
+int expected_safe_interval(const Scene& scene, const PairsNearEdge& near, double skin, bool relative, int longest);
 
 /// Powers of the relative displacement with which missed pairs, mean density deficit and mean
 /// acceleration deficit of a list without skin grow: W ~ x^k at the edge gives k + 1, the least power

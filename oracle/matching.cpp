@@ -29,14 +29,12 @@ Matching match_ids(const IdVector& expected, const IdVector& found) {
     }
   }
   for (const auto& [id, where] : places)
-    if (!std::binary_search(sorted.begin(), sorted.end(), id))
-      fault(2, fmt::format("id {} is of no particle", id));
+    if (!std::binary_search(sorted.begin(), sorted.end(), id)) fault(2, fmt::format("id {} is of no particle", id));
   if (matching.ok()) {
     for (const std::int64_t id : expected) matching.place.push_back(places[id].front());
     return matching;
   }
-  for (const auto& [kind, text] : first)
-    matching.trouble += (matching.trouble.empty() ? "" : ", ") + text;
+  for (const auto& [kind, text] : first) matching.trouble += (matching.trouble.empty() ? "" : ", ") + text;
   if (matching.faults > static_cast<std::int64_t>(first.size()))
     matching.trouble += fmt::format("; {} ids in all", matching.faults);
   return matching;

@@ -20,10 +20,8 @@ struct Matching {
   /// Columns (or values) in the expected order.
   template <class Matrix>
   Matrix ordered(const Matrix& found) const {
-    if constexpr (Matrix::ColsAtCompileTime == 1)
-      return found(place).eval();
-    else
-      return found(Eigen::all, place).eval();
+    if constexpr (Matrix::ColsAtCompileTime == 1) return found(place).eval();
+    else return found(Eigen::all, place).eval();
   }
 };
 

@@ -45,21 +45,17 @@ NamedField read_field(const Hdf5Reader& in, const std::string& path, std::int64_
   return field;
 }
 
-void require(const Hdf5Reader& in, const std::string& path, const Eigen::VectorXd& values,
-             bool negative_too) {
+void require(const Hdf5Reader& in, const std::string& path, const Eigen::VectorXd& values, bool negative_too) {
   for (Eigen::Index k = 0; k < values.size(); ++k)
     if (!std::isfinite(values[k]) || !(negative_too || values[k] >= 0))
-      in.fail(path, fmt::format("{:.9g} at {}", values[k], k),
-              negative_too ? "finite" : "finite, >= 0");
+      in.fail(path, fmt::format("{:.9g} at {}", values[k], k), negative_too ? "finite" : "finite, >= 0");
 }
 
 /// A real attribute that may be missing. Throws where it is not finite or below 0.
-std::optional<double> stated(const Hdf5Reader& in, const std::string& object,
-                             const std::string& name) {
+std::optional<double> stated(const Hdf5Reader& in, const std::string& object, const std::string& name) {
   if (!in.has_attribute(object, name)) return {};
   const double value = in.real_attribute(object, name);
-  if (!(value >= 0 && std::isfinite(value)))
-    in.fail(object + "@" + name, fmt::format("{:.9g}", value), "finite, >= 0");
+  if (!(value >= 0 && std::isfinite(value))) in.fail(object + "@" + name, fmt::format("{:.9g}", value), "finite, >= 0");
   return value;
 }
 
@@ -69,8 +65,7 @@ std::vector<std::string> states_of(const Hdf5Reader& in) {
   if (in.has("/fields")) states.push_back("");
   for (const auto& name : in.children("/"))
     if (in.has("/" + name + "/fields")) states.push_back("/" + name);
-  if (states.empty())
-    in.fail("/fields", "missing", "at the root, or in a group for each state");
+  if (states.empty()) in.fail("/fields", "missing", "at the root, or in a group for each state");
   if (states.size() > 1 && states.front().empty())
     in.fail(states[1] + "/fields", "beside /fields", "one state at the root, or several in groups");
   return states;
@@ -98,9 +93,7 @@ struct State {
     }
   }
   std::string field(const std::string& name) const { return path + "/fields/" + name; }
-  bool has(const std::string& name) const {
-    return std::find(names.begin(), names.end(), name) != names.end();
-  }
+  bool has(const std::string& name) const { return std::find(names.begin(), names.end(), name) != names.end(); }
 };
 
 /// (√n + c) (u + 2⁻⁵³) C of every value; empty where the field has no condition sum.
@@ -113,8 +106,7 @@ Eigen::VectorXd derived_tolerance(const State& oracle, const std::string& name, 
     return {};
   }
   const NamedField sums = read_field(in, path, oracle.n);
-  if (sums.components != components)
-    in.fail(path, sums.components == 3 ? "[N,3]" : "[N]", "the field's shape");
+  if (sums.components != components) in.fail(path, sums.components == 3 ? "[N,3]" : "[N]", "the field's shape");
   require(in, path, sums.values, false);
   const double u = stated(in, path, "precision").value_or(unit_roundoff);
   const double c = stated(in, path, "c").value_or(default_roundings);
@@ -127,8 +119,7 @@ Eigen::VectorXd derived_tolerance(const State& oracle, const std::string& name, 
   } else if (const auto same_for_all = stated(in, path, "terms")) {
     terms.setConstant(oracle.n, *same_for_all);
   } else {
-    in.fail(terms_path, "missing",
-            "the number of terms of each sum, here or in " + path + "@terms");
+    in.fail(terms_path, "missing", "the number of terms of each sum, here or in " + path + "@terms");
   }
   Eigen::VectorXd tolerance(sums.values.size());
   for (Eigen::Index k = 0; k < tolerance.size(); ++k)
@@ -144,8 +135,7 @@ double root_mean_square(const Eigen::VectorXd& values) {
 }
 
 /// tau of every value, or empty where the reference states nothing to judge by.
-Eigen::VectorXd tolerance_of(const State& oracle, const std::string& name,
-                             const NamedField& field) {
+Eigen::VectorXd tolerance_of(const State& oracle, const std::string& name, const NamedField& field) {
   const std::string path = oracle.field(name);
   Eigen::VectorXd tolerance = derived_tolerance(oracle, name, field.components);
   const auto absolute = stated(oracle.in, path, "tolerance");
@@ -157,14 +147,12 @@ Eigen::VectorXd tolerance_of(const State& oracle, const std::string& name,
   tolerance.array() += absolute.value_or(0) + relative.value_or(0) * root_mean_square(field.values);
   for (Eigen::Index k = 0; k < tolerance.size(); ++k)
     if (!std::isfinite(tolerance[k]))
-      oracle.in.fail(path, fmt::format("a tolerance beyond {:.3g} at {}",
-                                       std::numeric_limits<double>::max(), k),
+      oracle.in.fail(path, fmt::format("a tolerance beyond {:.3g} at {}", std::numeric_limits<double>::max(), k),
                      "values and condition sums whose tolerance is a finite double");
   return tolerance;
 }
 
-void judge_field(const State& oracle, const State& port, const Matching& ids,
-                 const std::string& name, Sheet& sheet) {
+void judge_field(const State& oracle, const State& port, const Matching& ids, const std::string& name, Sheet& sheet) {
   const std::string path = port.field(name);
   const NamedField expected = read_field(oracle.in, oracle.field(name), oracle.n);
   require(oracle.in, oracle.field(name), expected.values, true);
@@ -184,9 +172,10 @@ void judge_field(const State& oracle, const State& port, const Matching& ids,
     return;
   }
   if (tolerance.size() == 0) {
-    row.reason = fmt::format("{} has no tolerance for it: neither /condition nor @tolerance nor "
-                             "@relative",
-                             oracle.in.file().filename().string());
+    row.reason = fmt::format(
+        "{} has no tolerance for it: neither /condition nor @tolerance nor "
+        "@relative",
+        oracle.in.file().filename().string());
     return;
   }
   const Eigen::Map<const Eigen::MatrixXd> found(got.values.data(), got.components, port.n);
@@ -196,8 +185,7 @@ void judge_field(const State& oracle, const State& port, const Matching& ids,
 }
 
 void judge_state(const State& oracle, const State& port, Sheet& sheet) {
-  if (oracle.n == 0)
-    oracle.in.fail(oracle.path + "/fields", "no particle", "at least one field, one particle");
+  if (oracle.n == 0) oracle.in.fail(oracle.path + "/fields", "no particle", "at least one field, one particle");
   // Without ids a wrong number of particles is a wrong shape; with them, ids that are missing.
   if (!oracle.has_ids && !port.has_ids && port.n != oracle.n && !port.names.empty())
     port.in.fail(port.field(port.names.front()), fmt::format("{} particles", port.n),
@@ -208,25 +196,22 @@ void judge_state(const State& oracle, const State& port, Sheet& sheet) {
     if (oracle.in.has(oracle.path + group))
       for (const auto& name : oracle.in.children(oracle.path + group))
         if (!oracle.has(name))
-          oracle.in.fail(oracle.path + group + "/" + name, "of no field",
-                         "one of " + oracle.path + "/fields");
+          oracle.in.fail(oracle.path + group + "/" + name, "of no field", "one of " + oracle.path + "/fields");
   const Matching ids = match_ids(oracle.ids, port.ids);
   if (oracle.has_ids || port.has_ids) judge_ids(ids, oracle.n, sheet);
   for (const auto& name : oracle.names) judge_field(oracle, port, ids, name, sheet);
   for (const auto& name : port.names)
     if (!oracle.has(name))
-      sheet.row("fields", name, "").reason =
-          oracle.in.file().filename().string() + " has no such field";
+      sheet.row("fields", name, "").reason = oracle.in.file().filename().string() + " has no such field";
 }
 
 }  // namespace
 
-JudgedResults judge_named_fields(const std::filesystem::path& reference,
-                                 const std::filesystem::path& results, const std::string& name) {
+JudgedResults judge_named_fields(const std::filesystem::path& reference, const std::filesystem::path& results,
+                                 const std::string& name) {
   const Hdf5Reader oracle(reference), port(results);
   for (const auto& [in, kind, schema] :
-       {std::tuple{&oracle, "decant_reference", reference_schema},
-        std::tuple{&port, "decant_results", results_schema}})
+       {std::tuple{&oracle, "decant_reference", reference_schema}, std::tuple{&port, "decant_results", results_schema}})
     if (const std::int64_t found = in->integer_attribute("/", kind); found != schema)
       in->fail(fmt::format("/@{}", kind), std::to_string(found), std::to_string(schema));
 
@@ -252,8 +237,7 @@ JudgedResults judge_named_fields(const std::filesystem::path& reference,
   for (const auto& state : found) {
     if (has(expected, state)) continue;
     Sheet sheet(info, reference.stem().string() + state);
-    sheet.row("fields", "all", "").reason =
-        oracle.file().filename().string() + " has no such state";
+    sheet.row("fields", "all", "").reason = oracle.file().filename().string() + " has no such state";
     judged.add(sheet.take());
   }
   return judged;

@@ -78,8 +78,7 @@ void write_poses(Hdf5Writer& out, const std::string& group, const Scene& scene, 
   }
   out.attribute(group, "time", time);
   const char* names[3] = {"/x_axis", "/y_axis", "/z_axis"};
-  for (int a = 0; a < 3; ++a)
-    out.matrix3(group + names[a], axes[a], "1", "the frame's axis, in the world");
+  for (int a = 0; a < 3; ++a) out.matrix3(group + names[a], axes[a], "1", "the frame's axis, in the world");
   out.matrix3(group + "/translation", translation, "m", "the frame's origin, in the world");
   out.matrix3(group + "/pivot", pivot, "m", "in the world");
   out.matrix3(group + "/angular_velocity", spin, "rad/s", "about the pivot");
@@ -89,8 +88,7 @@ void write_poses(Hdf5Writer& out, const std::string& group, const Scene& scene, 
 
 }  // namespace
 
-void write_port_inputs(const std::filesystem::path& file, const Fixture& fixture,
-                       const Judgement& oracle) {
+void write_port_inputs(const std::filesystem::path& file, const Fixture& fixture, const Judgement& oracle) {
   const Scene& scene = fixture.scene;
   const ParticleState& state = fixture.state;
   Hdf5Writer out(file);

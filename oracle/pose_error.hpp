@@ -25,7 +25,7 @@
 namespace decant {
 
 struct PoseErrors {
-  Eigen::Matrix3Xd position;   // e_b, m
+  Eigen::Matrix3Xd position;  // e_b, m
   /// 4 u (|omega| × |x_b − p|)_c + (|omega| × (e_b + u|p|))_c + u |v_c| + 2 u (|linear_c| + |surface_c|), m/s,
   /// all products by magnitude.
   Eigen::Matrix3Xd velocity;
@@ -35,8 +35,7 @@ struct PoseErrors {
 };
 
 /// \param posed  of `walls` at `time` (s)
-PoseErrors pose_errors(const Scene& scene, const Walls& walls, const PosedWalls& posed, double time,
-                       double u);
+PoseErrors pose_errors(const Scene& scene, const Walls& walls, const PosedWalls& posed, double time, double u);
 
 /// Error of x_i − x_j by component c, m, where neither place is rounded itself:
 ///

@@ -16,8 +16,7 @@ class ReferenceBackend : public Backend {
   explicit ReferenceBackend(NeighborSearch search) : search_(search) {}
 
   BackendInfo info() const override {
-    return {"reference", search_ == NeighborSearch::all_pairs ? "all-pairs" : "", "reference",
-            "1 CPU core", "fp64"};
+    return {"reference", search_ == NeighborSearch::all_pairs ? "all-pairs" : "", "reference", "1 CPU core", "fp64"};
   }
 
   void load(const Scene& scene, const Walls& walls, const ParticleState& state) override {
@@ -69,11 +68,10 @@ class ReferenceBackend : public Backend {
   Status check() {
     const ParticleState& s = solver().state();
     for (Eigen::Index i = 0; i < s.size(); ++i) {
-      if (!s.position.col(i).allFinite() || !s.velocity.col(i).allFinite())
-        return {Status::non_finite, i, s.substep};
+      if (!s.position.col(i).allFinite() || !s.velocity.col(i).allFinite()) return {Status::non_finite, i, s.substep};
       for (int a = 0; a < 3; ++a)
-        if (!scene_.domain.periodic[a] && !(s.position(a, i) >= scene_.domain.min[a] &&
-                                            s.position(a, i) <= scene_.domain.max[a]))
+        if (!scene_.domain.periodic[a] &&
+            !(s.position(a, i) >= scene_.domain.min[a] && s.position(a, i) <= scene_.domain.max[a]))
           return {Status::escaped, i, s.substep};
     }
     return {};
@@ -100,8 +98,7 @@ std::string describe(const Status& status) {
   add(Status::escaped, "particle outside the domain");
   add(Status::capacity, "neighbor capacity exceeded");
   add(Status::missed_pair, "pair missed by a neighbor list");
-  return what + ", particle " + std::to_string(status.particle) + ", substep " +
-         std::to_string(status.substep);
+  return what + ", particle " + std::to_string(status.particle) + ", substep " + std::to_string(status.substep);
 }
 
 }  // namespace decant

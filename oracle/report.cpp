@@ -22,9 +22,7 @@ constexpr std::int64_t whole_arrays_budget = 8'000'000;
 constexpr int rows_with_worst_values = 300;
 constexpr Eigen::Index worst_values = 256;
 
-bool has_arrays(const CheckRow& row) {
-  return row.error.size() > 0 && row.error.size() == row.tolerances.size();
-}
+bool has_arrays(const CheckRow& row) { return row.error.size() > 0 && row.error.size() == row.tolerances.size(); }
 
 /// |error| / tolerance; 0 where both are 0, infinite where only the tolerance is. NaN counts as
 /// infinite, so that it sorts as the worst.
@@ -96,16 +94,14 @@ constexpr std::array<Reals, 10> real_columns = {{
 
 Eigen::VectorXd real_column(const std::vector<CheckRow>& rows, RealColumn member) {
   Eigen::VectorXd values(static_cast<Eigen::Index>(rows.size()));
-  for (std::size_t k = 0; k < rows.size(); ++k)
-    values[static_cast<Eigen::Index>(k)] = rows[k].*member;
+  for (std::size_t k = 0; k < rows.size(); ++k) values[static_cast<Eigen::Index>(k)] = rows[k].*member;
   return values;
 }
 
 void write_summary(Hdf5Writer& out, const std::vector<CheckRow>& rows) {
   for (const auto& [name, member] : text_columns) {
     std::vector<std::string> values;
-    for (const auto& row : rows)
-      values.push_back(member == &CheckRow::reason ? judged_reason(row) : row.*member);
+    for (const auto& row : rows) values.push_back(member == &CheckRow::reason ? judged_reason(row) : row.*member);
     out.strings(std::string("/summary/") + name, values);
   }
   std::vector<std::string> verdicts;
@@ -113,8 +109,7 @@ void write_summary(Hdf5Writer& out, const std::vector<CheckRow>& rows) {
   out.strings("/summary/verdict", verdicts, "pass, fail or not_run");
   for (const auto& [name, member] : integer_columns) {
     IdVector values(static_cast<Eigen::Index>(rows.size()));
-    for (std::size_t k = 0; k < rows.size(); ++k)
-      values[static_cast<Eigen::Index>(k)] = rows[k].*member;
+    for (std::size_t k = 0; k < rows.size(); ++k) values[static_cast<Eigen::Index>(k)] = rows[k].*member;
     out.integers(std::string("/summary/") + name, values);
   }
   for (const auto& [name, member, unit] : real_columns)
@@ -138,10 +133,9 @@ void write_check(Hdf5Writer& out, const std::string& group, const CheckRow& row,
     const Eigen::VectorXd scores = scores_of(row);
     IdVector order = IdVector::LinSpaced(scores.size(), 0, scores.size() - 1);
     const Eigen::Index kept = std::min(worst_values, scores.size());
-    std::partial_sort(order.begin(), order.begin() + kept, order.end(),
-                      [&](std::int64_t a, std::int64_t b) {
-                        return scores[a] != scores[b] ? scores[a] > scores[b] : a < b;
-                      });
+    std::partial_sort(order.begin(), order.begin() + kept, order.end(), [&](std::int64_t a, std::int64_t b) {
+      return scores[a] != scores[b] ? scores[a] > scores[b] : a < b;
+    });
     const IdVector worst = order.head(kept);
     error = row.error(worst).eval();
     tolerance = row.tolerances(worst).eval();
@@ -186,15 +180,13 @@ const char* to_string(Verdict verdict) {
 }
 
 Verdict judged_verdict(const CheckRow& row) {
-  const bool stands =
-      row.score >= 0 && row.score <= 1 && !std::isnan(row.value) && !std::isnan(row.tolerance);
+  const bool stands = row.score >= 0 && row.score <= 1 && !std::isnan(row.value) && !std::isnan(row.tolerance);
   return row.verdict == Verdict::pass && !stands ? Verdict::fail : row.verdict;
 }
 
 std::string judged_reason(const CheckRow& row) {
   if (judged_verdict(row) == row.verdict) return row.reason;
-  return fmt::format("said to pass with score {}, value {}, tolerance {}", row.score, row.value,
-                     row.tolerance);
+  return fmt::format("said to pass with score {}, value {}, tolerance {}", row.score, row.value, row.tolerance);
 }
 
 void condense(CheckRow& row) {
@@ -231,8 +223,7 @@ void write_report(const std::filesystem::path& file, const Report& report) {
 Report read_report(const std::filesystem::path& file) {
   const Hdf5Reader in(file);
   const std::int64_t schema = in.integer_attribute("/", "decant_report");
-  if (schema != report_schema)
-    in.fail("/@decant_report", std::to_string(schema), std::to_string(report_schema));
+  if (schema != report_schema) in.fail("/@decant_report", std::to_string(schema), std::to_string(report_schema));
   Report report;
   const std::vector<std::string> verdicts = in.strings("/summary/verdict");
   const auto n = static_cast<std::int64_t>(verdicts.size());
@@ -243,26 +234,21 @@ Report read_report(const std::filesystem::path& file) {
   }
   for (const auto& [name, member] : integer_columns) {
     const IdVector values = in.integers(std::string("/summary/") + name, n);
-    for (Eigen::Index k = 0; k < n; ++k)
-      report.rows[static_cast<std::size_t>(k)].*member = values[k];
+    for (Eigen::Index k = 0; k < n; ++k) report.rows[static_cast<std::size_t>(k)].*member = values[k];
   }
   for (const auto& [name, member, unit] : real_columns) {
     const Eigen::VectorXd values = in.vector(std::string("/summary/") + name, n);
-    for (Eigen::Index k = 0; k < n; ++k)
-      report.rows[static_cast<std::size_t>(k)].*member = values[k];
+    for (Eigen::Index k = 0; k < n; ++k) report.rows[static_cast<std::size_t>(k)].*member = values[k];
   }
   for (const int percent : quantile_percent) {
     const Eigen::VectorXd values = in.vector(fmt::format("/summary/score_p{}", percent), n);
-    for (Eigen::Index k = 0; k < n; ++k)
-      report.rows[static_cast<std::size_t>(k)].score_quantiles.push_back(values[k]);
+    for (Eigen::Index k = 0; k < n; ++k) report.rows[static_cast<std::size_t>(k)].score_quantiles.push_back(values[k]);
   }
   for (std::size_t k = 0; k < verdicts.size(); ++k) {
     const std::string& text = verdicts[k];
     if (text != "pass" && text != "fail" && text != "not_run")
       in.fail("/summary/verdict", fmt::format("{} at {}", text, k), "pass, fail or not_run");
-    report.rows[k].verdict = text == "pass"   ? Verdict::pass
-                             : text == "fail" ? Verdict::fail
-                                              : Verdict::not_run;
+    report.rows[k].verdict = text == "pass" ? Verdict::pass : text == "fail" ? Verdict::fail : Verdict::not_run;
   }
   for (const auto& name : in.attribute_names("/provenance"))
     report.provenance[name] = in.text_attribute("/provenance", name);

@@ -37,8 +37,8 @@ struct CheckRow {
   double tolerance = 0;  // that value's own tolerance
   double score = 0;      // max |error| / tolerance; passes where score <= 1
   double median_score = 0;
-  double float_score = 0;  // score of the oracle's source in sequential fp32; NaN where none
-  std::int64_t worst_id = -1;  // a wall particle's where the field is boundary_volume
+  double float_score = 0;             // score of the oracle's source in sequential fp32; NaN where none
+  std::int64_t worst_id = -1;         // a wall particle's where the field is boundary_volume
   std::int64_t worst_component = -1;  // 0, 1, 2 of a vector
   /// The worst value and the oracle's, in `unit`; `expected` is no number where a row has none.
   double got = no_number, expected = no_number;
@@ -46,7 +46,7 @@ struct CheckRow {
   /// (surroundings.hpp) for rows that fail at a particle.
   double worst_x = no_number, worst_y = no_number, worst_z = no_number;
   std::int64_t fluid_neighbors = -1, wall_neighbors = -1;
-  std::string nearest;  // ids of the eight nearest fluid neighbors at most, nearest first
+  std::string nearest;        // ids of the eight nearest fluid neighbors at most, nearest first
   std::int64_t excluded = 0;  // ambiguous particles left out, by name and within a bound
   Verdict verdict = Verdict::not_run;
   std::string reason;  // why not_run or fail; empty on a pass
@@ -65,12 +65,12 @@ void condense(CheckRow& row);
 
 /// Fluid and wall particles around the worst particle of one row, as points to look at.
 struct Surroundings {
-  std::int64_t row = -1;  // in the summary
-  double spacing = 0, support_radius = 0;  // m
-  Eigen::Matrix3Xd position;               // 3×P, m, fluid first
+  std::int64_t row = -1;                              // in the summary
+  double spacing = 0, support_radius = 0;             // m
+  Eigen::Matrix3Xd position;                          // 3×P, m, fluid first
   Eigen::Matrix<std::int64_t, Eigen::Dynamic, 1> id;  // P, of the fluid or of the walls
   std::vector<std::uint8_t> wall;                     // P, 1 for wall particles
-  Eigen::VectorXd density;  // P, the oracle's, kg/m³; no number for walls
+  Eigen::VectorXd density;                            // P, the oracle's, kg/m³; no number for walls
   /// P, of the row's field, where a vector's component scores most; no number where none.
   Eigen::VectorXd error, tolerance, score;
 };

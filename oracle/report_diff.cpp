@@ -19,8 +19,7 @@ namespace {
 constexpr std::size_t most_lines = 20;
 
 /// What makes a row the same in both; `repeat` counts rows of one report that are alike.
-using Key =
-    std::tuple<std::string, std::string, std::string, std::string, std::string, std::string, int>;
+using Key = std::tuple<std::string, std::string, std::string, std::string, std::string, std::string, int>;
 
 /// Rows by key, and their keys in the report's order.
 struct Keyed {
@@ -58,8 +57,7 @@ void compare_provenance(const Report& before, const Report& after, ReportDiff& d
   };
   for (const Report* report : {&before, &after})
     for (const auto& [key, text] : report->provenance)
-      if (value(before, key) != value(after, key))
-        diff.provenance[key] = {value(before, key), value(after, key)};
+      if (value(before, key) != value(after, key)) diff.provenance[key] = {value(before, key), value(after, key)};
 }
 
 std::string place_of(const CheckRow& row) {
@@ -72,12 +70,10 @@ std::string missing_text(const char* title, const std::vector<CheckRow>& rows) {
   for (const CheckRow& row : rows) groups[{backend_label(row), row.fixture}].push_back(&row);
   std::string text;
   for (const auto& [name, group] : groups) {
-    const auto passing = std::count_if(group.begin(), group.end(), [](const CheckRow* row) {
-      return judged_verdict(*row) == Verdict::pass;
-    });
-    std::string line =
-        fmt::format("{}: {} on {}: {} row{}, {} passing", title, name.first, name.second,
-                    group.size(), group.size() == 1 ? "" : "s", passing);
+    const auto passing = std::count_if(group.begin(), group.end(),
+                                       [](const CheckRow* row) { return judged_verdict(*row) == Verdict::pass; });
+    std::string line = fmt::format("{}: {} on {}: {} row{}, {} passing", title, name.first, name.second, group.size(),
+                                   group.size() == 1 ? "" : "s", passing);
     if (group.size() <= 4)
       for (const CheckRow* row : group)
         line += fmt::format("; {} {}", check_label(*row), to_string(judged_verdict(*row)));
@@ -89,9 +85,8 @@ std::string missing_text(const char* title, const std::vector<CheckRow>& rows) {
 std::string verdicts_text(const char* title, const std::vector<RowPair>& pairs) {
   std::string text;
   for (const auto& [before, after] : pairs) {
-    text += wrapped(fmt::format("{}: {} -> {}, score {:.3g} -> {:.3g}: {}", title,
-                                to_string(judged_verdict(before)), to_string(judged_verdict(after)),
-                                before.score, after.score, place_of(after)),
+    text += wrapped(fmt::format("{}: {} -> {}, score {:.3g} -> {:.3g}: {}", title, to_string(judged_verdict(before)),
+                                to_string(judged_verdict(after)), before.score, after.score, place_of(after)),
                     0);
     const std::string all = in_full(after);
     if (judged_verdict(after) != Verdict::pass) text += all.substr(all.find("\n    ") + 1);
@@ -104,21 +99,19 @@ std::string scores_text(const char* title, const std::vector<RowPair>& pairs) {
   for (std::size_t k = 0; k < std::min(pairs.size(), most_lines); ++k) {
     const auto& [before, after] = pairs[k];
     const double times = std::exp2(std::abs(growth(pairs[k])));
-    text += wrapped(fmt::format("{}: score {:.3g} -> {:.3g} ({:.3g} times): {}", title,
-                                before.score, after.score, times, place_of(after)),
+    text += wrapped(fmt::format("{}: score {:.3g} -> {:.3g} ({:.3g} times): {}", title, before.score, after.score,
+                                times, place_of(after)),
                     0);
   }
-  if (pairs.size() > most_lines)
-    text += fmt::format("{}: {} more\n", title, pairs.size() - most_lines);
+  if (pairs.size() > most_lines) text += fmt::format("{}: {} more\n", title, pairs.size() - most_lines);
   return text;
 }
 
 }  // namespace
 
 bool ReportDiff::got_worse() const {
-  return !worse.empty() || std::any_of(only_before.begin(), only_before.end(), [](const auto& row) {
-    return judged_verdict(row) == Verdict::pass;
-  });
+  return !worse.empty() || std::any_of(only_before.begin(), only_before.end(),
+                                       [](const auto& row) { return judged_verdict(row) == Verdict::pass; });
 }
 
 ReportDiff difference(const Report& before, const Report& after, double factor) {
@@ -136,17 +129,14 @@ ReportDiff difference(const Report& before, const Report& after, double factor) 
     RowPair pair{old_row, *found->second};
     const int step = badness(pair.after) - badness(pair.before);
     const double grown = growth(pair);
-    if (step != 0)
-      (step > 0 ? diff.worse : diff.better).push_back(std::move(pair));
-    else if (std::abs(grown) > std::log2(factor))
-      (grown > 0 ? diff.grown : diff.shrunk).push_back(std::move(pair));
+    if (step != 0) (step > 0 ? diff.worse : diff.better).push_back(std::move(pair));
+    else if (std::abs(grown) > std::log2(factor)) (grown > 0 ? diff.grown : diff.shrunk).push_back(std::move(pair));
   }
   for (const Key& key : new_rows.order)
     if (!old_rows.rows.count(key)) diff.only_after.push_back(*new_rows.rows.at(key));
   for (auto* moved : {&diff.grown, &diff.shrunk})
-    std::stable_sort(moved->begin(), moved->end(), [](const RowPair& a, const RowPair& b) {
-      return std::abs(growth(a)) > std::abs(growth(b));
-    });
+    std::stable_sort(moved->begin(), moved->end(),
+                     [](const RowPair& a, const RowPair& b) { return std::abs(growth(a)) > std::abs(growth(b)); });
   compare_provenance(before, after, diff);
   return diff;
 }
@@ -162,9 +152,9 @@ void pair_backends(Report& before, Report& after, const std::string& from, const
       row.executor.clear();
     }
     if (!any)
-      throw InputError("command line", "--pair", from + "=" + to,
-                       fmt::format("names of backends; there is no {} among {}", name,
-                                   fmt::join(backends_of(report), ", ")));
+      throw InputError(
+          "command line", "--pair", from + "=" + to,
+          fmt::format("names of backends; there is no {} among {}", name, fmt::join(backends_of(report), ", ")));
   };
   rename(before, from);
   rename(after, to);
@@ -173,15 +163,13 @@ void pair_backends(Report& before, Report& after, const std::string& from, const
 std::vector<std::string> backends_of(const Report& report) {
   std::vector<std::string> names;
   for (const CheckRow& row : report.rows)
-    if (std::find(names.begin(), names.end(), backend_label(row)) == names.end())
-      names.push_back(backend_label(row));
+    if (std::find(names.begin(), names.end(), backend_label(row)) == names.end()) names.push_back(backend_label(row));
   return names;
 }
 
 std::string diff_text(const ReportDiff& diff) {
   std::string text = verdicts_text("worse", diff.worse) + verdicts_text("better", diff.better) +
-                     missing_text("only before", diff.only_before) +
-                     missing_text("only after", diff.only_after) +
+                     missing_text("only before", diff.only_before) + missing_text("only after", diff.only_after) +
                      scores_text("grown", diff.grown) + scores_text("shrunk", diff.shrunk);
   for (const auto& [key, values] : diff.provenance)
     text += wrapped(fmt::format("{}: {} -> {}", key, values.first.empty() ? "-" : values.first,
@@ -199,10 +187,8 @@ std::string diff_line(const ReportDiff& diff) {
   tell(diff.better.size(), "better");
   tell(diff.only_before.size(), "only before");
   tell(diff.only_after.size(), "only after");
-  tell(diff.grown.size() + diff.shrunk.size(),
-       fmt::format("moved more than {:g} times", diff.factor));
-  return fmt::format("{} rows in both: {}: {}", diff.compared,
-                     changes.empty() ? "nothing moved" : changes,
+  tell(diff.grown.size() + diff.shrunk.size(), fmt::format("moved more than {:g} times", diff.factor));
+  return fmt::format("{} rows in both: {}: {}", diff.compared, changes.empty() ? "nothing moved" : changes,
                      diff.got_worse() ? "worse" : "no worse");
 }
 

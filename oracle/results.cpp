@@ -22,8 +22,7 @@ class ResultsReader {
   ResultsReader(const std::filesystem::path& file, const Fixture& fixture)
       : in_(file), fixture_(fixture), n_(fixture.state.size()) {
     const std::int64_t schema = in_.integer_attribute("/", "decant_results");
-    if (schema != results_schema)
-      in_.fail("/@decant_results", std::to_string(schema), std::to_string(results_schema));
+    if (schema != results_schema) in_.fail("/@decant_results", std::to_string(schema), std::to_string(results_schema));
     require_fixture();
     const Eigen::Index walls = sample_walls(fixture.scene).size();
     results_.own_fields = results_.staged_fields = Fields::unwritten(n_, walls);
@@ -50,33 +49,26 @@ class ResultsReader {
     for (const auto& field : stage_fields) {
       const bool of_walls = field.member == &Fields::boundary_volume;
       take(own_group, field.name, field.unit, results_.own, [&](const std::string& path) {
-        own.*field.member = of_walls ? in_.vector(path, own.boundary_volume.size())
-                                     : ordered(in_.vector(path, rows_));
+        own.*field.member = of_walls ? in_.vector(path, own.boundary_volume.size()) : ordered(in_.vector(path, rows_));
       });
     }
     for (const auto& fact : neighbor_facts)
-      take(own_group, fact.name, "", results_.own, [&](const std::string& path) {
-        own.*fact.member = ordered(in_.integers(path, rows_));
-      });
+      take(own_group, fact.name, "", results_.own,
+           [&](const std::string& path) { own.*fact.member = ordered(in_.integers(path, rows_)); });
     for (const auto& field : acceleration_fields) {
       const auto into = [&](Fields& fields) {
-        return [&](const std::string& path) {
-          fields.*field.member = ordered(in_.matrix3(path, rows_));
-        };
+        return [&](const std::string& path) { fields.*field.member = ordered(in_.matrix3(path, rows_)); };
       };
       take(own_group, field.name, "m/s^2", results_.own, into(own));
       take(staged_group, field.name, "m/s^2", results_.staged, into(results_.staged_fields));
     }
-    take(staged_group, "pressure", "Pa", results_.staged, [&](const std::string& path) {
-      results_.staged_fields.pressure = ordered(in_.vector(path, rows_));
-    });
+    take(staged_group, "pressure", "Pa", results_.staged,
+         [&](const std::string& path) { results_.staged_fields.pressure = ordered(in_.vector(path, rows_)); });
     ParticleState& after = results_.after_state;
-    take(after_group, "position", "m", results_.after, [&](const std::string& path) {
-      after.position = ordered(in_.matrix3(path, rows_));
-    });
-    take(after_group, "velocity", "m/s", results_.after, [&](const std::string& path) {
-      after.velocity = ordered(in_.matrix3(path, rows_));
-    });
+    take(after_group, "position", "m", results_.after,
+         [&](const std::string& path) { after.position = ordered(in_.matrix3(path, rows_)); });
+    take(after_group, "velocity", "m/s", results_.after,
+         [&](const std::string& path) { after.velocity = ordered(in_.matrix3(path, rows_)); });
     return std::move(results_);
   }
 
@@ -85,8 +77,7 @@ class ResultsReader {
     const bool by_digest = in_.has_attribute("/", "fixture_sha256");
     const bool by_number = in_.has_attribute("/", "particles");
     if (!by_digest && !by_number)
-      in_.fail("/@fixture_sha256", "missing",
-               "the fixture's SHA-256, or the number of its particles in /@particles");
+      in_.fail("/@fixture_sha256", "missing", "the fixture's SHA-256, or the number of its particles in /@particles");
     if (by_digest && in_.text_attribute("/", "fixture_sha256") != fixture_.sha256)
       in_.fail("/@fixture_sha256", in_.text_attribute("/", "fixture_sha256"),
                fmt::format("{}, that of {}", fixture_.sha256, fixture_.name));
@@ -100,8 +91,7 @@ class ResultsReader {
     if (!in_.has(group)) return;
     for (const auto& name : in_.children(group))
       if (std::find(known.begin(), known.end(), name) == known.end())
-        in_.fail(group + "/" + name, "unknown",
-                 fmt::format("one of {}", fmt::join(known, ", ")));
+        in_.fail(group + "/" + name, "unknown", fmt::format("one of {}", fmt::join(known, ", ")));
   }
 
   template <class Values>
@@ -110,8 +100,7 @@ class ResultsReader {
   }
 
   template <class Read>
-  void take(const std::string& group, const char* name, const std::string& unit, Answered& given,
-            const Read& read) {
+  void take(const std::string& group, const char* name, const std::string& unit, Answered& given, const Read& read) {
     const std::string path = group + "/" + name;
     if (!in_.has(path)) return;
     if (in_.has_attribute(path, "unit") && in_.text_attribute(path, "unit") != unit)
@@ -166,8 +155,8 @@ Results read_results(const std::filesystem::path& file, const Fixture& fixture) 
   return ResultsReader(file, fixture).read();
 }
 
-JudgedResults judge(const Results& results, const std::string& name, const Fixture& fixture,
-                    const Judgement& oracle, const CheckSelection& checks) {
+JudgedResults judge(const Results& results, const std::string& name, const Fixture& fixture, const Judgement& oracle,
+                    const CheckSelection& checks) {
   const BackendInfo info{name, "", "file", results.device, ""};
   Sheet sheet(info, fixture.name);
   if (checks.count("fields")) {
@@ -175,10 +164,8 @@ JudgedResults judge(const Results& results, const std::string& name, const Fixtu
     judge_staged(results.staged_fields, results.staged, oracle, sheet);
     judge_evaluation(results.own_fields, results.own, oracle, sheet);
   }
-  if (checks.count("substep"))
-    judge_substep(results.after_state, results.after, fixture, oracle, sheet);
-  if (checks.count("conservation"))
-    judge_momentum(results.staged_fields, results.staged, fixture, oracle, sheet);
+  if (checks.count("substep")) judge_substep(results.after_state, results.after, fixture, oracle, sheet);
+  if (checks.count("conservation")) judge_momentum(results.staged_fields, results.staged, fixture, oracle, sheet);
   std::vector<CheckRow> rows = sheet.take();
   JudgedResults judged;
   if (results.has_ids) {

@@ -52,7 +52,7 @@ Results read_results(const std::filesystem::path& file, const Fixture& fixture);
 /// Each field that was given, by the tolerance that a backend's has.
 /// \param name  stands as the rows' backend, "file" as their executor
 /// \param oracle  prepared for these checks at least; \param checks  of results_checks()
-JudgedResults judge(const Results& results, const std::string& name, const Fixture& fixture,
-                    const Judgement& oracle, const CheckSelection& checks);
+JudgedResults judge(const Results& results, const std::string& name, const Fixture& fixture, const Judgement& oracle,
+                    const CheckSelection& checks);
 
 }  // namespace decant

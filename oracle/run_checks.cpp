@@ -52,8 +52,7 @@ Run run(Backend& backend, const Fixture& fixture, const Judgement& oracle, std::
 }
 
 /// Bits that differ, value by value.
-std::int64_t differing(const Eigen::Ref<const Eigen::MatrixXd>& a,
-                       const Eigen::Ref<const Eigen::MatrixXd>& b) {
+std::int64_t differing(const Eigen::Ref<const Eigen::MatrixXd>& a, const Eigen::Ref<const Eigen::MatrixXd>& b) {
   if (a.rows() != b.rows() || a.cols() != b.cols()) return std::max(a.size(), b.size());
   std::int64_t count = 0;
   for (Eigen::Index c = 0; c < a.cols(); ++c)
@@ -69,18 +68,17 @@ void judge_trajectory(const Run& r, const Fixture& fixture, const Judgement& ora
     CheckRow& row = sheet.row("trajectory", divergence_names[k], divergence_units[k]);
     compare(apart[k], bound[k], row);
     if (row.verdict == Verdict::fail)
-      row.reason = fmt::format(
-          "{} substeps on; {} disturbed runs of the oracle are apart by {:.3g} ± {:.2g}",
-          fixture.ensemble.substeps, fixture.ensemble.members, fixture.ensemble.mean[k],
-          fixture.ensemble.deviation[k]);
+      row.reason = fmt::format("{} substeps on; {} disturbed runs of the oracle are apart by {:.3g} ± {:.2g}",
+                               fixture.ensemble.substeps, fixture.ensemble.members, fixture.ensemble.mean[k],
+                               fixture.ensemble.deviation[k]);
   }
 }
 
 /// Particles that have both position and velocity of another one, bit for bit, though they should be
 /// `apart` and did not start as one; two drops that come to rest in one corner may well be the same to
 /// fp32, and what parts those that start as one is nothing but the order of a sum.
-std::int64_t doubled(const ParticleState& s, const ParticleState& start,
-                     const ParticleState& expected, double apart, std::int64_t& one) {
+std::int64_t doubled(const ParticleState& s, const ParticleState& start, const ParticleState& expected, double apart,
+                     std::int64_t& one) {
   std::vector<std::array<double, 6>> all(static_cast<std::size_t>(s.size()));
   std::vector<std::size_t> order(all.size());
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -90,18 +88,14 @@ std::int64_t doubled(const ParticleState& s, const ParticleState& start,
       all[i][static_cast<std::size_t>(c) + 3] = s.velocity(c, static_cast<Eigen::Index>(i));
     }
   }
-  const auto before = [&](std::size_t a, std::size_t b) {
-    return std::memcmp(&all[a], &all[b], sizeof all[a]) < 0;
-  };
+  const auto before = [&](std::size_t a, std::size_t b) { return std::memcmp(&all[a], &all[b], sizeof all[a]) < 0; };
   std::sort(order.begin(), order.end(), before);
   std::int64_t count = 0;
   for (std::size_t k = 1; k < order.size(); ++k) {
     if (before(order[k - 1], order[k])) continue;
     const auto i = static_cast<Eigen::Index>(order[k - 1]), j = static_cast<Eigen::Index>(order[k]);
     if ((expected.position.col(i) - expected.position.col(j)).norm() <= apart) continue;
-    if (start.position.col(i) == start.position.col(j) &&
-        start.velocity.col(i) == start.velocity.col(j))
-      continue;
+    if (start.position.col(i) == start.position.col(j) && start.velocity.col(i) == start.velocity.col(j)) continue;
     one = static_cast<std::int64_t>(order[k]);
     ++count;
   }
@@ -110,8 +104,7 @@ std::int64_t doubled(const ParticleState& s, const ParticleState& start,
 
 void judge_mass(const Run& r, const Fixture& fixture, const Judgement& oracle, Sheet& sheet) {
   const auto n = fixture.state.size();
-  const auto exact = [&](const char* field, std::int64_t off, const std::string& why,
-                         std::int64_t id) {
+  const auto exact = [&](const char* field, std::int64_t off, const std::string& why, std::int64_t id) {
     CheckRow& row = sheet.row("mass", field, "1");
     compare(static_cast<double>(off), 0, row, id);
     row.n = n;
@@ -124,16 +117,14 @@ void judge_mass(const Run& r, const Fixture& fixture, const Judgement& oracle, S
       bad_id = i;
     }
   exact("finite", bad, "particles are no numbers", bad_id);
-  const std::int64_t twins =
-      doubled(r.end, fixture.state, oracle.later, 0.01 * fixture.scene.particle_spacing, one);
+  const std::int64_t twins = doubled(r.end, fixture.state, oracle.later, 0.01 * fixture.scene.particle_spacing, one);
   exact("distinct", twins, "particles are another one's copy", one);
   const AuditResult& last = r.looks.back();
   std::int64_t total = 0;
   for (const auto count : last.particles_at) total += count;
   exact("places", std::abs(total - n), "particles are in no place or in two", -1);
   const auto lost = static_cast<std::size_t>(Place::lost);
-  exact("lost",
-        std::max<std::int64_t>(0, last.particles_at[lost] - oracle.later_look.particles_at[lost]),
+  exact("lost", std::max<std::int64_t>(0, last.particles_at[lost] - oracle.later_look.particles_at[lost]),
         "particles more than the oracle's are outside the domain", -1);
 }
 
@@ -165,21 +156,16 @@ void judge_containment(const Run& r, const Scene& scene, const Judgement& oracle
     crossed = std::max(crossed, look.crossed);
   }
   CheckRow& depth = sheet.row("containment", "depth", "m");
-  compare(std::max(0.0, deepest - oracle.deepest), depth_tolerance(scene, oracle.deepest), depth,
-          deepest_id);
+  compare(std::max(0.0, deepest - oracle.deepest), depth_tolerance(scene, oracle.deepest), depth, deepest_id);
   if (depth.verdict == Verdict::fail)
-    depth.reason = fmt::format("{:.3g} m inside a wall, the oracle's run {:.3g} m", deepest,
-                               oracle.deepest);
+    depth.reason = fmt::format("{:.3g} m inside a wall, the oracle's run {:.3g} m", deepest, oracle.deepest);
   CheckRow& paths = sheet.row("containment", "crossings", "1");
-  compare(static_cast<double>(std::max<std::int64_t>(0, crossed - oracle.crossed)), 0, paths,
-          crossed_id);
+  compare(static_cast<double>(std::max<std::int64_t>(0, crossed - oracle.crossed)), 0, paths, crossed_id);
   if (paths.verdict == Verdict::fail)
-    paths.reason = fmt::format("{} particles went through a wall, first seen {} substeps on", crossed,
-                               when);
+    paths.reason = fmt::format("{} particles went through a wall, first seen {} substeps on", crossed, when);
 }
 
-void judge_conservation(Backend& backend, const Fixture& fixture, const Judgement& oracle,
-                        Sheet& sheet) {
+void judge_conservation(Backend& backend, const Fixture& fixture, const Judgement& oracle, Sheet& sheet) {
   backend.load(fixture.scene, oracle.walls, fixture.state);
   const auto n = oracle.given.fields.density.size(), m = oracle.own.fields.boundary_volume.size();
   Fields got = Fields::unwritten(n, m);
@@ -190,14 +176,13 @@ void judge_conservation(Backend& backend, const Fixture& fixture, const Judgemen
   judge_momentum(got, all_answered(), fixture, oracle, sheet);
 }
 
-void judge_determinism(Backend& backend, const Fixture& fixture, const Judgement& oracle,
-                       const Run& first, Sheet& sheet) {
+void judge_determinism(Backend& backend, const Fixture& fixture, const Judgement& oracle, const Run& first,
+                       Sheet& sheet) {
   const auto n = oracle.own.fields.density.size(), m = oracle.own.fields.boundary_volume.size();
   std::array<Fields, 2> fields{Fields::unwritten(n, m), Fields::unwritten(n, m)};
   for (Fields& f : fields) {
     backend.load(fixture.scene, oracle.walls, fixture.state);
-    if (const Status status = backend.evaluate(f); !status.ok())
-      return sheet.failed("determinism", describe(status));
+    if (const Status status = backend.evaluate(f); !status.ok()) return sheet.failed("determinism", describe(status));
   }
   const auto exact = [&](const char* name, std::int64_t differ) {
     CheckRow& row = sheet.row("determinism", name, "1");
@@ -207,8 +192,7 @@ void judge_determinism(Backend& backend, const Fixture& fixture, const Judgement
   };
   const Fields &a = fields[0], &b = fields[1];
   exact("fields", differing(a.density, b.density) + differing(a.pressure, b.pressure) +
-                      differing(a.acceleration, b.acceleration) +
-                      differing(a.boundary_volume, b.boundary_volume));
+                      differing(a.acceleration, b.acceleration) + differing(a.boundary_volume, b.boundary_volume));
   const Run second = run(backend, fixture, oracle, oracle.repeated);
   if (!second.status.ok()) return sheet.failed("determinism", describe(second.status));
   exact("run", differing(first.early.position, second.early.position) +
@@ -245,8 +229,11 @@ void judge_invariance(Backend& backend, const Judgement& oracle, Sheet& sheet) {
       return sheet.row("invariance", t.problem.name + " " + field, unit);
     };
     const auto same = [&](const char* field, const char* unit, auto member, int components) {
-      compare({by_original(t.problem, got.*member), by_original(t.problem, t.answer.fields.*member),
-               by_original(t.problem, t.answer.tolerance.*member), {}, components},
+      compare({by_original(t.problem, got.*member),
+               by_original(t.problem, t.answer.fields.*member),
+               by_original(t.problem, t.answer.tolerance.*member),
+               {},
+               components},
               row(field, unit));
     };
     same("density", "kg/m^3", &Fields::density, 1);
@@ -257,21 +244,19 @@ void judge_invariance(Backend& backend, const Judgement& oracle, Sheet& sheet) {
 
 }  // namespace
 
-void judge_runs(Backend& backend, const Fixture& fixture, const Judgement& oracle,
-                const CheckSelection& checks, Sheet& sheet) {
+void judge_runs(Backend& backend, const Fixture& fixture, const Judgement& oracle, const CheckSelection& checks,
+                Sheet& sheet) {
   const auto wanted = [&](const char* name) { return checks.count(name) > 0; };
   if (!oracle.stretches.empty()) {
     const Run r = run(backend, fixture, oracle, oracle.stretches.size());
-    const bool whole = r.end.position.cols() == fixture.state.size() &&
-                       r.end.velocity.cols() == fixture.state.size();
+    const bool whole = r.end.position.cols() == fixture.state.size() && r.end.velocity.cols() == fixture.state.size();
     for (const char* name : {"advanced", "trajectory", "mass", "containment", "determinism"}) {
       if (!checks.count(name)) continue;
       if (!r.status.ok()) {
         sheet.failed(name, describe(r.status));
       } else if (!whole) {
-        sheet.failed(name, fmt::format("{} positions and {} velocities, not {}",
-                                       r.end.position.cols(), r.end.velocity.cols(),
-                                       fixture.state.size()));
+        sheet.failed(name, fmt::format("{} positions and {} velocities, not {}", r.end.position.cols(),
+                                       r.end.velocity.cols(), fixture.state.size()));
       } else if (name == std::string("advanced")) {
         judge_advanced(r.views, fixture, oracle.walls, oracle.volumes, sheet);
       } else if (name == std::string("trajectory")) {

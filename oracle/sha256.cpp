@@ -21,9 +21,7 @@ class Sha256 {
     require(context_ && EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr) == 1);
   }
 
-  void add(const void* bytes, std::size_t size) {
-    require(EVP_DigestUpdate(context_.get(), bytes, size) == 1);
-  }
+  void add(const void* bytes, std::size_t size) { require(EVP_DigestUpdate(context_.get(), bytes, size) == 1); }
 
   /// Real numbers as fp32. Adding 0 makes −0 and 0 one value, as they are for every consumer.
   template <typename Derived>
@@ -73,12 +71,11 @@ std::string digest_of(const Fields& fields) {
   sha.add_reals(fields.boundary_volume);
   sha.add_reals(fields.density);
   sha.add_reals(fields.pressure);
-  for (const auto* a :
-       {&fields.acceleration, &fields.pressure_acceleration, &fields.viscous_acceleration,
-        &fields.wall_pressure_acceleration, &fields.wall_viscous_acceleration})
+  for (const auto* a : {&fields.acceleration, &fields.pressure_acceleration, &fields.viscous_acceleration,
+                        &fields.wall_pressure_acceleration, &fields.wall_viscous_acceleration})
     sha.add_reals(*a);
-  for (const auto* c : {&fields.fluid_neighbor_count, &fields.fluid_neighbor_id_sum,
-                        &fields.wall_neighbor_count, &fields.wall_neighbor_id_sum})
+  for (const auto* c : {&fields.fluid_neighbor_count, &fields.fluid_neighbor_id_sum, &fields.wall_neighbor_count,
+                        &fields.wall_neighbor_id_sum})
     sha.add(c->data(), static_cast<std::size_t>(c->size()) * sizeof(std::int64_t));
   return sha.hexadecimal();
 }

@@ -24,9 +24,8 @@ std::pair<double, double> farthest_two(const Separation& separation, const Eigen
 }
 
 /// Keeps of the listed ones those closer than H now, and counts against all that are.
-void compare(const Separation& separation, double H, const Eigen::Matrix3Xd& from,
-             const Eigen::Matrix3Xd& to, const std::vector<std::vector<std::int32_t>>& listed,
-             const std::vector<std::vector<std::int32_t>>& all,
+void compare(const Separation& separation, double H, const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to,
+             const std::vector<std::vector<std::int32_t>>& listed, const std::vector<std::vector<std::int32_t>>& all,
              std::vector<std::vector<std::int32_t>>& kept, PairCount& count) {
   kept.resize(listed.size());
   std::vector<std::int32_t> lost;
@@ -40,12 +39,9 @@ void compare(const Separation& separation, double H, const Eigen::Matrix3Xd& fro
     count.within += static_cast<std::int64_t>(all[i].size());
     if (kept[i].size() == all[i].size()) continue;
     lost.clear();
-    std::set_difference(all[i].begin(), all[i].end(), listed[i].begin(), listed[i].end(),
-                        std::back_inserter(lost));
+    std::set_difference(all[i].begin(), all[i].end(), listed[i].begin(), listed[i].end(), std::back_inserter(lost));
     count.missed += static_cast<std::int64_t>(lost.size());
-    for (const auto j : lost)
-      count.deepest =
-          std::max(count.deepest, (H - separation(x, Vec3(to.col(j))).norm()) / H);
+    for (const auto j : lost) count.deepest = std::max(count.deepest, (H - separation(x, Vec3(to.col(j))).norm()) / H);
   }
 }
 
@@ -69,8 +65,7 @@ FieldDeficit deficit(const Matrix& whole, const Matrix& partial, const Matrix& t
 
 }  // namespace
 
-Instant look_at(const Scene& scene, const Walls& walls, const WallAnswer& volumes,
-                const ParticleState& state) {
+Instant look_at(const Scene& scene, const Walls& walls, const WallAnswer& volumes, const ParticleState& state) {
   Instant now;
   now.state = state;
   now.walls = pose_walls(scene, walls, scene.time_at(state.substep));
@@ -81,8 +76,7 @@ Instant look_at(const Scene& scene, const Walls& walls, const WallAnswer& volume
   return now;
 }
 
-StaleList::StaleList(const Scene& scene, const Eigen::VectorXd& volumes, const Instant& built,
-                     double skin)
+StaleList::StaleList(const Scene& scene, const Eigen::VectorXd& volumes, const Instant& built, double skin)
     : scene_(scene),
       volumes_(volumes),
       skin_(skin),
@@ -94,8 +88,7 @@ StaleList::StaleList(const Scene& scene, const Eigen::VectorXd& volumes, const I
   find_neighbors(wide, fluid_, wall_, NeighborSearch::cells, listed_);
 }
 
-StaleList::StaleList(const Scene& scene, const Eigen::VectorXd& volumes, const Instant& built,
-                     Neighbors listed)
+StaleList::StaleList(const Scene& scene, const Eigen::VectorXd& volumes, const Instant& built, Neighbors listed)
     : scene_(scene),
       volumes_(volumes),
       skin_(std::numeric_limits<double>::quiet_NaN()),
@@ -112,10 +105,8 @@ Staleness StaleList::at(const Instant& now) const {
   std::tie(s.farthest, s.second) = farthest_two(separation, now.state.position, fluid_);
   s.wall_farthest = farthest_two(separation, now.walls.position, wall_).first;
   Neighbors kept;
-  compare(separation, H, now.state.position, now.state.position, listed_.fluid, now.near.fluid,
-          kept.fluid, s.fluid);
-  compare(separation, H, now.state.position, now.walls.position, listed_.wall, now.near.wall,
-          kept.wall, s.wall);
+  compare(separation, H, now.state.position, now.state.position, listed_.fluid, now.near.fluid, kept.fluid, s.fluid);
+  compare(separation, H, now.state.position, now.walls.position, listed_.wall, now.near.wall, kept.wall, s.wall);
   if (s.fluid.missed + s.wall.missed == 0) return s;
   Fields stale;
   evaluate<double>(scene_, now.state, now.walls, volumes_, kept, stale);
@@ -124,12 +115,12 @@ Staleness StaleList::at(const Instant& now) const {
   s.density = deficit(row(whole.density), row(stale.density), row(allowed.density));
   s.pressure = deficit(row(whole.pressure), row(stale.pressure), row(allowed.pressure));
   const Eigen::Matrix3Xd g = scene_.gravity.replicate(1, now.state.size());
-  s.acceleration = deficit(Eigen::Matrix3Xd(whole.acceleration - g),
-                           Eigen::Matrix3Xd(stale.acceleration - g), allowed.acceleration);
-  s.wall_acceleration = deficit(
-      Eigen::Matrix3Xd(whole.wall_pressure_acceleration + whole.wall_viscous_acceleration),
-      Eigen::Matrix3Xd(stale.wall_pressure_acceleration + stale.wall_viscous_acceleration),
-      Eigen::Matrix3Xd(allowed.wall_pressure_acceleration + allowed.wall_viscous_acceleration));
+  s.acceleration =
+      deficit(Eigen::Matrix3Xd(whole.acceleration - g), Eigen::Matrix3Xd(stale.acceleration - g), allowed.acceleration);
+  s.wall_acceleration =
+      deficit(Eigen::Matrix3Xd(whole.wall_pressure_acceleration + whole.wall_viscous_acceleration),
+              Eigen::Matrix3Xd(stale.wall_pressure_acceleration + stale.wall_viscous_acceleration),
+              Eigen::Matrix3Xd(allowed.wall_pressure_acceleration + allowed.wall_viscous_acceleration));
   return s;
 }
 

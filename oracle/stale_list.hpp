@@ -32,10 +32,10 @@ struct FieldDeficit {
 
 /// One list at one instant.
 struct Staleness {
-  std::int64_t age = 0;          // substeps since the build
+  std::int64_t age = 0;  // substeps since the build
   PairCount fluid, wall;
-  double farthest = 0, second = 0;  // m, the two largest displacements of fluid since the build
-  double wall_farthest = 0;         // m, the largest one of a wall particle
+  double farthest = 0, second = 0;               // m, the two largest displacements of fluid since the build
+  double wall_farthest = 0;                      // m, the largest one of a wall particle
   FieldDeficit density, pressure, acceleration;  // of all terms but gravity
   FieldDeficit wall_acceleration;                // of the wall's terms alone
 
@@ -51,14 +51,13 @@ struct Staleness {
 struct Instant {
   ParticleState state;
   PosedWalls walls;
-  Neighbors near;       // all pairs within H
-  Fields fields;        // from them
-  Fields tolerance;     // of a backend in fp32
+  Neighbors near;    // all pairs within H
+  Fields fields;     // from them
+  Fields tolerance;  // of a backend in fp32
 };
 
 /// The oracle's view of a state. \param volumes  of the wall particles
-Instant look_at(const Scene& scene, const Walls& walls, const WallAnswer& volumes,
-                const ParticleState& state);
+Instant look_at(const Scene& scene, const Walls& walls, const WallAnswer& volumes, const ParticleState& state);
 
 /// The list of pairs closer than (1 + skin) H at its build.
 class StaleList {
@@ -66,8 +65,7 @@ class StaleList {
   /// \param skin  share of H, >= 0
   StaleList(const Scene& scene, const Eigen::VectorXd& volumes, const Instant& built, double skin);
   /// A given one, of unknown skin (NaN). \param listed  every list ascending
-  StaleList(const Scene& scene, const Eigen::VectorXd& volumes, const Instant& built,
-            Neighbors listed);
+  StaleList(const Scene& scene, const Eigen::VectorXd& volumes, const Instant& built, Neighbors listed);
 
   /// What it misses at a later instant of the same run.
   Staleness at(const Instant& now) const;

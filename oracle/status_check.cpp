@@ -27,8 +27,7 @@ struct Tally {
   void add(const std::string& what, const Status& got, const Status& expected) {
     ++asked;
     const bool right = got.bits == expected.bits &&
-                       (expected.ok() || (got.particle == expected.particle &&
-                                          got.substep == expected.substep));
+                       (expected.ok() || (got.particle == expected.particle && got.substep == expected.substep));
     if (right || wrong++ > 0) return;
     first = fmt::format("{}: {}; should be {}", what, describe(got), describe(expected));
   }
@@ -36,8 +35,7 @@ struct Tally {
 
 class Trouble {
  public:
-  Trouble(Backend& backend, const Scene& scene, std::int64_t substep)
-      : backend_(backend), scene_(force_free(scene)) {
+  Trouble(Backend& backend, const Scene& scene, std::int64_t substep) : backend_(backend), scene_(force_free(scene)) {
     scene_.containers.clear();
     scene_.floor.reset();
     const Domain& domain = scene_.domain;
@@ -45,8 +43,8 @@ class Trouble {
     Eigen::Index longest;
     size.maxCoeff(&longest);
     // In a row along the longest axis, out of each other's reach.
-    const auto n = static_cast<Eigen::Index>(
-        std::clamp(std::floor(size[longest] / (1.5 * scene_.support_radius())), 1.0, 5.0));
+    const auto n =
+        static_cast<Eigen::Index>(std::clamp(std::floor(size[longest] / (1.5 * scene_.support_radius())), 1.0, 5.0));
     state_.substep = substep;
     state_.position = (domain.min + 0.5 * size).replicate(1, n);
     for (Eigen::Index i = 0; i < n; ++i)
@@ -78,32 +76,26 @@ class Trouble {
         two = state_;
         leaves(two, id_, axis, upper, 2);
         leaves(two, 0, axis, upper, 3);
-        tally.add("one after the other out through " + face, run(two),
-                  trouble(Status::escaped, id_, 2));
+        tally.add("one after the other out through " + face, run(two), trouble(Status::escaped, id_, 2));
       }
     }
   }
 
-  void non_finite(Eigen::Matrix3Xd ParticleState::*member, bool evaluates, Tally& tally) {
+  void non_finite(Eigen::Matrix3Xd ParticleState::* member, bool evaluates, Tally& tally) {
     for (int axis = 0; axis < 3; ++axis)
       for (const double value : {std::nan(""), infinity, -infinity}) {
         ParticleState state = state_;
         (state.*member)(axis, id_) = value;
         const std::string what = fmt::format("{} = {}", axis_names[axis], value);
-        refusable(tally, [&] {
-          tally.add(what + ", run", run(state), trouble(Status::non_finite, id_, 1));
-        });
+        refusable(tally, [&] { tally.add(what + ", run", run(state), trouble(Status::non_finite, id_, 1)); });
         if (!evaluates || !std::isnan(value)) continue;
-        refusable(tally, [&] {
-          tally.add(what + ", evaluated", evaluated(state), trouble(Status::non_finite, id_, 0));
-        });
+        refusable(tally,
+                  [&] { tally.add(what + ", evaluated", evaluated(state), trouble(Status::non_finite, id_, 0)); });
       }
   }
 
  private:
-  Status trouble(Status::Bit bit, Eigen::Index id, int after) const {
-    return {bit, id, state_.substep + after};
-  }
+  Status trouble(Status::Bit bit, Eigen::Index id, int after) const { return {bit, id, state_.substep + after}; }
   /// So that the particle is outside for the first time so many substeps on.
   void leaves(ParticleState& state, Eigen::Index id, int axis, bool upper, int after) const {
     const Domain& domain = scene_.domain;

@@ -18,8 +18,7 @@ void gather_images(const Domain& domain, std::vector<SubstepOutcome>& outcomes) 
   }
 }
 
-SubstepAnswer substep_answer(const Scene& scene, const ParticleState& state,
-                             const OracleAnswer& fields) {
+SubstepAnswer substep_answer(const Scene& scene, const ParticleState& state, const OracleAnswer& fields) {
   const ContactBounds bounds(scene);
   const std::vector<Pose> poses = bounds.poses_at(scene.time_at(state.substep + 1));
   const auto n = static_cast<std::size_t>(state.size());

@@ -34,7 +34,6 @@ struct SubstepAnswer {
 /// tau_v = dt tau_a + 2u (|v| + dt|a|), tau_x = dt tau_v + u (2|x| + 4 dt|v|), and what contacts make of
 /// them (contact_bounds.hpp).
 /// \param fields  the oracle's answer at `state`
-SubstepAnswer substep_answer(const Scene& scene, const ParticleState& state,
-                             const OracleAnswer& fields);
+SubstepAnswer substep_answer(const Scene& scene, const ParticleState& state, const OracleAnswer& fields);
 
 }  // namespace decant

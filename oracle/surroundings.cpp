@@ -19,18 +19,15 @@ constexpr std::size_t most_named = 8;
 Vec3 place_of(const CheckRow& row) { return {row.worst_x, row.worst_y, row.worst_z}; }
 
 /// Squared distances of all columns from x, m².
-Eigen::VectorXd squared_distances(const Domain& domain, const Vec3& x,
-                                  const Eigen::Matrix3Xd& all) {
+Eigen::VectorXd squared_distances(const Domain& domain, const Vec3& x, const Eigen::Matrix3Xd& all) {
   const Separation separation(domain);
   Eigen::VectorXd out(all.cols());
-  for (Eigen::Index j = 0; j < all.cols(); ++j)
-    out[j] = separation(x, Vec3(all.col(j))).squaredNorm();
+  for (Eigen::Index j = 0; j < all.cols(); ++j) out[j] = separation(x, Vec3(all.col(j))).squaredNorm();
   return out;
 }
 
 /// Columns nearer than `radius`, ascending, without `self`.
-std::vector<Eigen::Index> nearer(const Eigen::VectorXd& squared, double radius,
-                                 Eigen::Index self = -1) {
+std::vector<Eigen::Index> nearer(const Eigen::VectorXd& squared, double radius, Eigen::Index self = -1) {
   std::vector<Eigen::Index> found;
   for (Eigen::Index j = 0; j < squared.size(); ++j)
     if (squared[j] < radius * radius && j != self) found.push_back(j);
@@ -50,10 +47,8 @@ void locate(const Fixture& fixture, const PosedWalls& walls, CheckRow& row) {
   const Eigen::VectorXd to_walls = squared_distances(fixture.scene.domain, x, walls.position);
   auto near = nearer(to_fluid, H, is_of_walls(row) ? -1 : row.worst_id);
   row.fluid_neighbors = static_cast<std::int64_t>(near.size());
-  row.wall_neighbors =
-      static_cast<std::int64_t>(nearer(to_walls, H, is_of_walls(row) ? row.worst_id : -1).size());
-  std::stable_sort(near.begin(), near.end(),
-                   [&](Eigen::Index a, Eigen::Index b) { return to_fluid[a] < to_fluid[b]; });
+  row.wall_neighbors = static_cast<std::int64_t>(nearer(to_walls, H, is_of_walls(row) ? row.worst_id : -1).size());
+  std::stable_sort(near.begin(), near.end(), [&](Eigen::Index a, Eigen::Index b) { return to_fluid[a] < to_fluid[b]; });
   row.nearest.clear();
   for (std::size_t k = 0; k < std::min(near.size(), most_named); ++k)
     row.nearest += fmt::format("{}{}", k > 0 ? " " : "", near[k]);
@@ -66,8 +61,7 @@ struct Figures {
 
 Figures figures_of(const CheckRow& row, Eigen::Index particle, Eigen::Index particles) {
   Figures worst;
-  if (row.error.size() == 0 || row.error.size() != row.tolerances.size() ||
-      row.error.size() % particles != 0) {
+  if (row.error.size() == 0 || row.error.size() != row.tolerances.size() || row.error.size() % particles != 0) {
     if (particle == row.worst_id) worst = {row.value, row.tolerance, row.score};
     return worst;
   }
@@ -89,18 +83,15 @@ void locate(const Fixture& fixture, const Walls& walls, std::vector<CheckRow>& r
   std::optional<PosedWalls> posed;
   for (CheckRow& row : rows) {
     if (judged_verdict(row) != Verdict::fail || row.worst_id < 0) continue;
-    if (!posed)
-      posed = pose_walls(fixture.scene, walls, fixture.scene.time_at(fixture.state.substep));
+    if (!posed) posed = pose_walls(fixture.scene, walls, fixture.scene.time_at(fixture.state.substep));
     locate(fixture, *posed, row);
   }
 }
 
-Surroundings surroundings_of(const Fixture& fixture, const Walls& walls,
-                             const Eigen::VectorXd& density, const CheckRow& row,
-                             std::int64_t index, double radius) {
+Surroundings surroundings_of(const Fixture& fixture, const Walls& walls, const Eigen::VectorXd& density,
+                             const CheckRow& row, std::int64_t index, double radius) {
   const Domain& domain = fixture.scene.domain;
-  const PosedWalls posed =
-      pose_walls(fixture.scene, walls, fixture.scene.time_at(fixture.state.substep));
+  const PosedWalls posed = pose_walls(fixture.scene, walls, fixture.scene.time_at(fixture.state.substep));
   const Eigen::Matrix3Xd& fluid = fixture.state.position;
   const auto near_fluid = nearer(squared_distances(domain, place_of(row), fluid), radius);
   const auto near_walls = nearer(squared_distances(domain, place_of(row), posed.position), radius);
@@ -114,15 +105,13 @@ Surroundings surroundings_of(const Fixture& fixture, const Walls& walls,
   s.id.resize(n);
   for (auto* reals : {&s.density, &s.error, &s.tolerance, &s.score}) reals->resize(n);
   Eigen::Index k = 0;
-  const auto add = [&](const std::vector<Eigen::Index>& ids, const Eigen::Matrix3Xd& all,
-                       bool of_walls) {
+  const auto add = [&](const std::vector<Eigen::Index>& ids, const Eigen::Matrix3Xd& all, bool of_walls) {
     for (const Eigen::Index i : ids) {
       s.position.col(k) = all.col(i);
       s.id[k] = i;
       s.wall.push_back(of_walls);
       s.density[k] = of_walls ? no_number : density[i];
-      const Figures figures =
-          of_walls == is_of_walls(row) ? figures_of(row, i, all.cols()) : Figures{};
+      const Figures figures = of_walls == is_of_walls(row) ? figures_of(row, i, all.cols()) : Figures{};
       s.error[k] = figures.error;
       s.tolerance[k] = figures.tolerance;
       s.score[k] = figures.score;
@@ -135,8 +124,7 @@ Surroundings surroundings_of(const Fixture& fixture, const Walls& walls,
 }
 
 Cut cut_out(const Fixture& fixture, const CheckRow& row, double radius) {
-  const auto kept = nearer(
-      squared_distances(fixture.scene.domain, place_of(row), fixture.state.position), radius);
+  const auto kept = nearer(squared_distances(fixture.scene.domain, place_of(row), fixture.state.position), radius);
   Cut cut;
   cut.fixture.phase = fixture.phase;
   cut.fixture.scene = fixture.scene;

@@ -22,9 +22,8 @@ void locate(const Fixture& fixture, const Walls& walls, std::vector<CheckRow>& r
 
 /// Fluid and walls within `radius` (m) of a located row's worst particle. \param density  N, kg/m³,
 /// the oracle's; \param index  the row's place in the report
-Surroundings surroundings_of(const Fixture& fixture, const Walls& walls,
-                             const Eigen::VectorXd& density, const CheckRow& row,
-                             std::int64_t index, double radius);
+Surroundings surroundings_of(const Fixture& fixture, const Walls& walls, const Eigen::VectorXd& density,
+                             const CheckRow& row, std::int64_t index, double radius);
 
 /// A fixture of part of the fluid, in the same scene at the same time.
 struct Cut {

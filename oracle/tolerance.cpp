@@ -25,8 +25,7 @@ double along(const Vec3& x, double r, const Vec3& e) {
   return r > 0 ? x.cwiseAbs().dot(e) / r : e.norm();
 }
 
-Eigen::VectorXd volume_tolerances(const Scene& scene, const WallNeighbors& neighbors,
-                                  const Eigen::VectorXd& volumes) {
+Eigen::VectorXd volume_tolerances(const Scene& scene, const WallNeighbors& neighbors, const Eigen::VectorXd& volumes) {
   const Kernel<double> kernel(scene.kernel, scene.support_radius());
   const Separation separation(scene.domain);
   const double H = scene.support_radius();
@@ -45,8 +44,7 @@ Eigen::VectorXd volume_tolerances(const Scene& scene, const WallNeighbors& neigh
       const double r = x_bk.norm(), W = kernel.W(r), slope = kernel.slope_W(r);
       sum.add(W);
       by_H += r * slope - 3 * W;
-      inside += own * W + of_distance * r * slope +
-                slope * along(x_bk, r, pair_error(x_b, x_k, x_bk, H, 1.0));
+      inside += own * W + of_distance * r * slope + slope * along(x_bk, r, pair_error(x_b, x_k, x_bk, H, 1.0));
     }
     tolerance[b] = volumes[b] * volumes[b] * sum.error(u, u * (inside + std::abs(by_H)), cells) + 2 * u * volumes[b];
   }
@@ -55,8 +53,8 @@ Eigen::VectorXd volume_tolerances(const Scene& scene, const WallNeighbors& neigh
 
 class Bounds {
  public:
-  Bounds(const Scene& scene, const Walls& walls, const WallAnswer& volumes,
-         const ParticleState& state, const StageInputs* given)
+  Bounds(const Scene& scene, const Walls& walls, const WallAnswer& volumes, const ParticleState& state,
+         const StageInputs* given)
       : scene_(scene),
         state_(state),
         given_(given),
@@ -152,8 +150,7 @@ class Bounds {
       // A pair that fp32 may place inside H has a term no larger than that of its nearest place.
       double from_edge = 0;
       for (const Edge& e : edge_fluid_[static_cast<std::size_t>(i)]) from_edge += m * kernel_.W(e.r);
-      for (const Edge& e : edge_wall_[static_cast<std::size_t>(i)])
-        from_edge += rho0 * V[e.id] * kernel_.W(e.r);
+      for (const Edge& e : edge_wall_[static_cast<std::size_t>(i)]) from_edge += rho0 * V[e.id] * kernel_.W(e.r);
       C.density[i] = sum;
       C.density_pose[i] = pose;
       answer_.tolerance.density[i] =
@@ -184,15 +181,12 @@ class Bounds {
     const bool p_given = given_ && given_->pressure.size();
     const double p = p_given ? given_->pressure[i] : answer_.fields.pressure[i];
     if (p_given) tau_p = 0;
-    tau_q_[i] = tau_p / (rho * rho) + 2 * std::abs(p) * tau_rho / (rho * rho * rho) +
-                4 * u * std::abs(p) / (rho * rho);
+    tau_q_[i] = tau_p / (rho * rho) + 2 * std::abs(p) * tau_rho / (rho * rho * rho) + 4 * u * std::abs(p) / (rho * rho);
     if (tau_p == 0 || rho_given) return;
     // What is off alike for all particles shifts their q together: norm and mass, the walls' place (a rounded
     // translation or pivot), their volumes, images by a rounded period.
-    const double slope = c0 * c0 * std::pow(compression, gamma - 1) / (rho * rho) -
-                         2 * p / (rho * rho * rho);
-    in_common_q_.col(i).head<5>() << u * (common_.W + of_mass) * rho * slope, slope * displaced,
-        slope * from_volumes;
+    const double slope = c0 * c0 * std::pow(compression, gamma - 1) / (rho * rho) - 2 * p / (rho * rho * rho);
+    in_common_q_.col(i).head<5>() << u * (common_.W + of_mass) * rho * slope, slope * displaced, slope * from_volumes;
     if (periodic_) in_common_q_.col(i).tail<6>() = slope * images.reshaped();
   }
 
@@ -205,8 +199,8 @@ class Bounds {
     const auto n = state_.size();
     auto& C = answer_.condition;
     auto& T = answer_.tolerance;
-    for (auto* sum : {&C.pressure_acceleration, &C.viscous_acceleration,
-                      &C.wall_pressure_acceleration, &C.wall_viscous_acceleration})
+    for (auto* sum : {&C.pressure_acceleration, &C.viscous_acceleration, &C.wall_pressure_acceleration,
+                      &C.wall_viscous_acceleration})
       sum->setZero(3, n);
     rho_ = given_ && given_->density.size() ? given_->density : answer_.fields.density;
     q_ = (given_ && given_->pressure.size() ? given_->pressure : answer_.fields.pressure).array() /
@@ -276,10 +270,9 @@ class Bounds {
     pressure.inputs += in_common.cwiseAbs().rowwise().sum() + by_images.cwiseAbs().rowwise().sum();
     for (const Edge& e : edge_fluid_[static_cast<std::size_t>(i)]) {
       const Eigen::Index j = e.id;
-      pressure.inputs += m * std::abs(q_i + q_[j]) * kernel_.G(e.r) *
-                         separation_(x_i, Vec3(state_.position.col(j))).cwiseAbs();
-      viscous.inputs += of_i / rho_[j] * kernel_.L(e.r) *
-                        (state_.velocity.col(j) - v_i).cwiseAbs();
+      pressure.inputs +=
+          m * std::abs(q_i + q_[j]) * kernel_.G(e.r) * separation_(x_i, Vec3(state_.position.col(j))).cwiseAbs();
+      viscous.inputs += of_i / rho_[j] * kernel_.L(e.r) * (state_.velocity.col(j) - v_i).cwiseAbs();
     }
   }
 
@@ -315,8 +308,7 @@ class Bounds {
     for (const Edge& e : edge_wall_[static_cast<std::size_t>(i)]) {
       pressure.inputs += rho0 * V[e.id] * std::abs(q_[i]) * kernel_.G(e.r) *
                          separation_(x_i, Vec3(posed_.position.col(e.id))).cwiseAbs();
-      viscous.inputs += mu_w / rho_[i] * V[e.id] * kernel_.L(e.r) *
-                        (posed_.velocity.col(e.id) - v_i).cwiseAbs();
+      viscous.inputs += mu_w / rho_[i] * V[e.id] * kernel_.L(e.r) * (posed_.velocity.col(e.id) - v_i).cwiseAbs();
     }
   }
 
@@ -335,8 +327,9 @@ class Bounds {
     if (pose_.position.size()) widest += pose_.position.colwise().norm().maxCoeff();
     const Domain& domain = scene_.domain;
     if (periodic_)
-      widest += 3 * u * (3 * (domain.max - domain.min).maxCoeff() +
-                         domain.min.cwiseAbs().cwiseMax(domain.max.cwiseAbs()).maxCoeff());
+      widest +=
+          3 * u *
+          (3 * (domain.max - domain.min).maxCoeff() + domain.min.cwiseAbs().cwiseMax(domain.max.cwiseAbs()).maxCoeff());
     return widest;
   }
   /// How far fp32's distance may be from the pair's, m. \param e  error of its separation
@@ -405,8 +398,8 @@ WallAnswer wall_answer(const Scene& scene, const Walls& walls) {
   return a;
 }
 
-OracleAnswer answer(const Scene& scene, const Walls& walls, const WallAnswer& volumes,
-                    const ParticleState& state, const StageInputs* given) {
+OracleAnswer answer(const Scene& scene, const Walls& walls, const WallAnswer& volumes, const ParticleState& state,
+                    const StageInputs* given) {
   return Bounds(scene, walls, volumes, state, given).take();
 }
 
@@ -414,8 +407,8 @@ OracleAnswer answer(const Scene& scene, const Walls& walls, const ParticleState&
   return answer(scene, walls, wall_answer(scene, walls), state);
 }
 
-Fields float_fields(const Scene& scene, const Walls& walls, const WallAnswer& volumes,
-                    const ParticleState& state, const StageInputs* given) {
+Fields float_fields(const Scene& scene, const Walls& walls, const WallAnswer& volumes, const ParticleState& state,
+                    const StageInputs* given) {
   const PosedWalls posed = pose_walls(scene, walls, scene.time_at(state.substep));
   Neighbors near;
   find_neighbors(scene, state.position, posed.position, NeighborSearch::cells, near);

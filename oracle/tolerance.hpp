@@ -57,12 +57,12 @@ WallAnswer wall_answer(const Scene& scene, const Walls& walls);
 /// A pair that fp32 may find on the other side of H adds its term at the nearest place that fp32 may find,
 /// to each of them. With `given`, density and pressure are inputs, exact to both sides: their tolerances
 /// vanish from what follows; density alone is that of the equation of state.
-OracleAnswer answer(const Scene& scene, const Walls& walls, const WallAnswer& volumes,
-                    const ParticleState& state, const StageInputs* given = nullptr);
+OracleAnswer answer(const Scene& scene, const Walls& walls, const WallAnswer& volumes, const ParticleState& state,
+                    const StageInputs* given = nullptr);
 OracleAnswer answer(const Scene& scene, const Walls& walls, const ParticleState& state);
 
 /// The oracle's own source in sequential fp32 on the same inputs: what plain single precision costs.
-Fields float_fields(const Scene& scene, const Walls& walls, const WallAnswer& volumes,
-                    const ParticleState& state, const StageInputs* given = nullptr);
+Fields float_fields(const Scene& scene, const Walls& walls, const WallAnswer& volumes, const ParticleState& state,
+                    const StageInputs* given = nullptr);
 
 }  // namespace decant

@@ -79,10 +79,8 @@ TransformedProblem turned(const Scene& scene, const ParticleState& state) {
 
 }  // namespace
 
-std::vector<TransformedProblem> transformed_problems(const Scene& scene, const ParticleState& state,
-                                                     unsigned seed) {
-  return {permuted(scene, state, seed), moved(scene, state, Vec3::Constant(0.5)),
-          turned(scene, state)};
+std::vector<TransformedProblem> transformed_problems(const Scene& scene, const ParticleState& state, unsigned seed) {
+  return {permuted(scene, state, seed), moved(scene, state, Vec3::Constant(0.5)), turned(scene, state)};
 }
 
 }  // namespace decant

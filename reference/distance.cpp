@@ -58,8 +58,7 @@ SurfaceDistance revolved_distance(const std::vector<ProfileEdge>& edges, const V
   return {sign * d, normal_r * meridian + Vec3(0, 0, normal_z)};
 }
 
-SurfaceDistance box_distance(const std::vector<BoxFace>& faces, const std::vector<SolidBox>& solid,
-                             const Vec3& x) {
+SurfaceDistance box_distance(const std::vector<BoxFace>& faces, const std::vector<SolidBox>& solid, const Vec3& x) {
   double best = std::numeric_limits<double>::infinity();
   Vec3 offset = Vec3::Zero();
   BoxFace at{};
@@ -106,8 +105,8 @@ SurfaceDistance SolidDistance::at(const Vec3& local) const {
 
 bool SolidDistance::in_cavity(const Vec3& local) const {
   if (!revolved_)
-    return (local.array() >= box_.cavity.min.array()).all() &&
-           (local.array() <= box_.cavity.max.array()).all() && !in_solid(box_.solid, local);
+    return (local.array() >= box_.cavity.min.array()).all() && (local.array() <= box_.cavity.max.array()).all() &&
+           !in_solid(box_.solid, local);
   const double r = std::hypot(local.x(), local.y());
   const int outward = crossings_outward(edges_, r, local.z());
   return outward > 0 && outward % 2 == 0 && crossings_below(edges_, r, local.z()) > 0;

@@ -34,8 +34,7 @@ class SolidDistance {
 
   /// False where the point is certainly farther than `reach` (m) from the solid's bounding box.
   bool may_be_within(double reach, const Vec3& local) const {
-    return (local.array() >= low_.array() - reach).all() &&
-           (local.array() <= high_.array() + reach).all();
+    return (local.array() >= low_.array() - reach).all() && (local.array() <= high_.array() + reach).all();
   }
 
  private:

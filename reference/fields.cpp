@@ -75,9 +75,8 @@ std::int64_t sum_of(const std::vector<std::int32_t>& ids) {
 }  // namespace
 
 template <class Real>
-void evaluate(const Scene& scene, const ParticleState& state, const PosedWalls& walls,
-              const Eigen::VectorXd& volumes, const Neighbors& neighbors, Fields& out,
-              const StageInputs* given) {
+void evaluate(const Scene& scene, const ParticleState& state, const PosedWalls& walls, const Eigen::VectorXd& volumes,
+              const Neighbors& neighbors, Fields& out, const StageInputs* given) {
   using Vector = Vector3<Real>;
   using Matrix = Eigen::Matrix<Real, 3, Eigen::Dynamic>;
   const Kernel<Real> kernel(scene.kernel, scene.support_radius());
@@ -94,12 +93,8 @@ void evaluate(const Scene& scene, const ParticleState& state, const PosedWalls& 
   const Matrix x_wall = walls.position.cast<Real>(), v_wall = walls.velocity.cast<Real>();
   using Column = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
   const Column V = volumes.cast<Real>();
-  const auto fluid_of = [&](Eigen::Index i) -> const auto& {
-    return neighbors.fluid[static_cast<std::size_t>(i)];
-  };
-  const auto wall_of = [&](Eigen::Index i) -> const auto& {
-    return neighbors.wall[static_cast<std::size_t>(i)];
-  };
+  const auto fluid_of = [&](Eigen::Index i) -> const auto& { return neighbors.fluid[static_cast<std::size_t>(i)]; };
+  const auto wall_of = [&](Eigen::Index i) -> const auto& { return neighbors.wall[static_cast<std::size_t>(i)]; };
 
   out = Fields::unwritten(n, walls.position.cols());
   out.boundary_volume = volumes;
@@ -107,8 +102,7 @@ void evaluate(const Scene& scene, const ParticleState& state, const PosedWalls& 
   for (Eigen::Index i = 0; i < n; ++i) {
     const Vector x_i = x.col(i);
     Real sum = density_term(m, kernel.W(0));
-    for (const auto j : fluid_of(i))
-      sum += density_term(m, kernel.W(separation(x_i, Vector(x.col(j))).norm()));
+    for (const auto j : fluid_of(i)) sum += density_term(m, kernel.W(separation(x_i, Vector(x.col(j))).norm()));
     for (const auto b : wall_of(i))
       sum += wall_density_term(rho0, V[b], kernel.W(separation(x_i, Vector(x_wall.col(b))).norm()));
     rho[i] = sum;
@@ -143,8 +137,7 @@ void evaluate(const Scene& scene, const ParticleState& state, const PosedWalls& 
     out.viscous_acceleration.col(i) = viscous.template cast<double>();
     out.wall_pressure_acceleration.col(i) = wall_pressure.template cast<double>();
     out.wall_viscous_acceleration.col(i) = wall_viscous.template cast<double>();
-    out.acceleration.col(i) =
-        (pressure + viscous + wall_pressure + wall_viscous + g).template cast<double>();
+    out.acceleration.col(i) = (pressure + viscous + wall_pressure + wall_viscous + g).template cast<double>();
   }
 }
 
@@ -152,11 +145,9 @@ template Eigen::VectorXd boundary_volumes<double>(const Scene&, const Walls&);
 template Eigen::VectorXd boundary_volumes<float>(const Scene&, const Walls&);
 template Eigen::VectorXd boundary_volumes<double>(const Scene&, const WallNeighbors&);
 template Eigen::VectorXd boundary_volumes<float>(const Scene&, const WallNeighbors&);
-template void evaluate<double>(const Scene&, const ParticleState&, const PosedWalls&,
-                               const Eigen::VectorXd&, const Neighbors&, Fields&,
-                               const StageInputs*);
-template void evaluate<float>(const Scene&, const ParticleState&, const PosedWalls&,
-                              const Eigen::VectorXd&, const Neighbors&, Fields&,
-                              const StageInputs*);
+template void evaluate<double>(const Scene&, const ParticleState&, const PosedWalls&, const Eigen::VectorXd&,
+                               const Neighbors&, Fields&, const StageInputs*);
+template void evaluate<float>(const Scene&, const ParticleState&, const PosedWalls&, const Eigen::VectorXd&,
+                              const Neighbors&, Fields&, const StageInputs*);
 
 }  // namespace decant

@@ -21,8 +21,7 @@ struct Lattice {
 Lattice lattice_in(const SolidBox& box, double dx) {
   Lattice lattice;
   lattice.first = box.min.array() + 0.5 * dx;
-  for (int a = 0; a < 3; ++a)
-    lattice.size[a] = static_cast<int>(std::floor((box.max[a] - box.min[a]) / dx + 1e-6));
+  for (int a = 0; a < 3; ++a) lattice.size[a] = static_cast<int>(std::floor((box.max[a] - box.min[a]) / dx + 1e-6));
   return lattice;
 }
 
@@ -111,9 +110,7 @@ ParticleState initial_state(const Scene& scene) {
         for (int i = 0; i < lattice.size[0]; ++i) {
           const Vec3 x = lattice.first + dx * Vec3(i, j, k);
           if (fill.round && !holds(*fill.round, x, dx)) continue;
-          if (solid &&
-              (!solid->in_cavity(x) || solid->at(x).distance < 0.5 * dx * (1 - 1e-6)))
-            continue;
+          if (solid && (!solid->in_cavity(x) || solid->at(x).distance < 0.5 * dx * (1 - 1e-6))) continue;
           if (!immersed.leave_room(pose.to_world(x), 0.5 * dx * (1 - 1e-6))) continue;
           position.push_back(pose.to_world(x));
           velocity.push_back(fill.velocity_at(position.back()));

@@ -16,9 +16,7 @@ class Kernel {
  public:
   /// \param support_radius  H, m
   Kernel(KernelFamily family, double support_radius)
-      : family_(family),
-        H_(static_cast<Real>(support_radius)),
-        h_(static_cast<Real>(0.5 * support_radius)) {
+      : family_(family), H_(static_cast<Real>(support_radius)), h_(static_cast<Real>(0.5 * support_radius)) {
     const double pi = std::numbers::pi, H = support_radius, h = 0.5 * H;
     switch (family) {
       case KernelFamily::cubic_spline:

@@ -20,9 +20,7 @@ struct Cubic {
   double before, turn;  // the value at `from`, and what is added to it
   double slope;         // at `to`; 0 at `from`
 
-  double rate(double s) const {
-    return turn * 6.0 * s * (1.0 - s) / (to - from) + slope * (s * (3.0 * s - 2.0));
-  }
+  double rate(double s) const { return turn * 6.0 * s * (1.0 - s) / (to - from) + slope * (s * (3.0 * s - 2.0)); }
   /// Largest |rate| between two times.
   double greatest_rate(double t0, double t1) const {
     const double s0 = std::clamp((t0 - from) / (to - from), 0.0, 1.0);
@@ -40,8 +38,7 @@ struct Cubic {
 template <class Key, class Of>
 double greatest_rate(const std::vector<Key>& keys, Of of, double slope, double from, double to) {
   double greatest = to > keys.back().time ? std::abs(slope) : 0.0;
-  auto next = std::upper_bound(keys.begin(), keys.end(), from,
-                               [](double t, const Key& key) { return t < key.time; });
+  auto next = std::upper_bound(keys.begin(), keys.end(), from, [](double t, const Key& key) { return t < key.time; });
   if (next == keys.begin()) ++next;
   for (; next != keys.end() && (next - 1)->time <= to; ++next) {
     const Cubic cubic{(next - 1)->time, next->time, of(*(next - 1)), of(*next) - of(*(next - 1)),
@@ -86,29 +83,25 @@ void add_period(double period, std::vector<double>& to) {
 double greatest_rate(const Tilt& tilt, double from, double to) {
   double rate = greatest_rate(tilt.keys, angle_of, tilt.rate, from, to);
   if (tilt.oscillation)
-    rate += 2 * std::numbers::pi * tilt.oscillation->frequency *
-            std::abs(tilt.oscillation->amplitude);
+    rate += 2 * std::numbers::pi * tilt.oscillation->frequency * std::abs(tilt.oscillation->amplitude);
   return rate;
 }
 
 double greatest_speed(const Translation& translation, double from, double to) {
   Vec3 speed;
   for (Eigen::Index a = 0; a < 3; ++a)
-    speed[a] = greatest_rate(translation.keys,
-                             [a](const TranslationKey& key) { return key.offset[a]; },
-                             translation.velocity[a], from, to);
+    speed[a] = greatest_rate(
+        translation.keys, [a](const TranslationKey& key) { return key.offset[a]; }, translation.velocity[a], from, to);
   double greatest = speed.norm();
   if (translation.oscillation)
-    greatest += 2 * std::numbers::pi * translation.oscillation->frequency *
-                translation.oscillation->amplitude.norm();
+    greatest += 2 * std::numbers::pi * translation.oscillation->frequency * translation.oscillation->amplitude.norm();
   return greatest;
 }
 
 AngleRange angle_range(const Tilt& tilt, double end) {
   Tilt plain = tilt;
   plain.oscillation.reset();
-  const AngleRange all = range(
-      tilt.keys, angle_of, [&](double t) { return tilt_at(plain, t).angle; }, tilt.rate, end);
+  const AngleRange all = range(tilt.keys, angle_of, [&](double t) { return tilt_at(plain, t).angle; }, tilt.rate, end);
   const double swing = tilt.oscillation ? std::abs(tilt.oscillation->amplitude) : 0.0;
   return {all.low - swing, all.high + swing};
 }
@@ -116,14 +109,12 @@ AngleRange angle_range(const Tilt& tilt, double end) {
 double farthest_offset(const Translation& translation, const Vec3& direction, double end) {
   Translation plain = translation;
   plain.oscillation.reset();
-  double farthest =
-      range(
-          translation.keys, [&](const TranslationKey& key) { return direction.dot(key.offset); },
-          [&](double t) { return direction.dot(translation_at(plain, t).offset); },
-          direction.dot(translation.velocity), end)
-          .high;
-  if (translation.oscillation)
-    farthest += std::abs(direction.dot(translation.oscillation->amplitude));
+  double farthest = range(
+                        translation.keys, [&](const TranslationKey& key) { return direction.dot(key.offset); },
+                        [&](double t) { return direction.dot(translation_at(plain, t).offset); },
+                        direction.dot(translation.velocity), end)
+                        .high;
+  if (translation.oscillation) farthest += std::abs(direction.dot(translation.oscillation->amplitude));
   return farthest;
 }
 
@@ -145,15 +136,13 @@ double until_repetition(const std::vector<const Container*>& containers, double 
   for (const Container* c : containers) {
     if (c->tilt) {
       settled = std::max(settled, c->tilt->keys.back().time);
-      if (c->tilt->rate != 0)
-        add_period(2 * std::numbers::pi / std::abs(c->tilt->rate), periods);
+      if (c->tilt->rate != 0) add_period(2 * std::numbers::pi / std::abs(c->tilt->rate), periods);
       if (c->tilt->oscillation) add_period(1 / c->tilt->oscillation->frequency, periods);
     }
     if (c->translation) {
       settled = std::max(settled, c->translation->keys.back().time);
       if (!c->translation->velocity.isZero(0)) return end;
-      if (c->translation->oscillation)
-        add_period(1 / c->translation->oscillation->frequency, periods);
+      if (c->translation->oscillation) add_period(1 / c->translation->oscillation->frequency, periods);
     }
   }
   if (periods.size() > 1) return end;

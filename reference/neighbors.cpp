@@ -15,12 +15,10 @@ void clear(std::vector<std::vector<std::int32_t>>& lists, Eigen::Index n) {
   for (auto& list : lists) list.clear();
 }
 
-void search_all_pairs(const Scene& scene, const Eigen::Matrix3Xd& fluid,
-                      const Eigen::Matrix3Xd& wall, Neighbors& out) {
+void search_all_pairs(const Scene& scene, const Eigen::Matrix3Xd& fluid, const Eigen::Matrix3Xd& wall, Neighbors& out) {
   const Separation separation(scene.domain);
   const double squared_support = scene.support_radius() * scene.support_radius();
-  const auto n = static_cast<std::int32_t>(fluid.cols()),
-             m = static_cast<std::int32_t>(wall.cols());
+  const auto n = static_cast<std::int32_t>(fluid.cols()), m = static_cast<std::int32_t>(wall.cols());
   for (std::int32_t j = 0; j < n; ++j) {
     const Vec3 x_j = fluid.col(j);
     for (std::int32_t i = j + 1; i < n; ++i)
@@ -32,8 +30,7 @@ void search_all_pairs(const Scene& scene, const Eigen::Matrix3Xd& fluid,
   for (std::int32_t i = 0; i < n; ++i) {
     const Vec3 x_i = fluid.col(i);
     for (std::int32_t b = 0; b < m; ++b)
-      if (separation(x_i, Vec3(wall.col(b))).squaredNorm() < squared_support)
-        out.wall[i].push_back(b);
+      if (separation(x_i, Vec3(wall.col(b))).squaredNorm() < squared_support) out.wall[i].push_back(b);
   }
 }
 
@@ -111,8 +108,7 @@ class CellList {
 
  private:
   /// Cells that follow each other along x hold their particles without a gap.
-  void add_run(std::size_t first_cell, std::size_t last_cell, const Vec3& x,
-               std::vector<std::int32_t>& found) const {
+  void add_run(std::size_t first_cell, std::size_t last_cell, const Vec3& x, std::vector<std::int32_t>& found) const {
     const std::size_t begin = start_[first_cell], end = start_[last_cell + 1];
     std::size_t n = found.size();
     found.resize(n + (end - begin));
@@ -131,9 +127,7 @@ class CellList {
     return static_cast<int>(std::clamp(c, static_cast<double>(least), static_cast<double>(most)));
   }
   int wrapped(int c, int a) const { return (c + count_[a]) % count_[a]; }
-  std::size_t index(int x, int y, int z) const {
-    return (static_cast<std::size_t>(z) * count_[1] + y) * count_[0] + x;
-  }
+  std::size_t index(int x, int y, int z) const { return (static_cast<std::size_t>(z) * count_[1] + y) * count_[0] + x; }
 
   Separation separation_;
   double squared_radius_;
@@ -148,8 +142,8 @@ class CellList {
 /// Hands every ordered pair of fluid particles and every pair with a wall to a function, ids of the second
 /// one ascending. \param add  (i, j, whether j is a wall)
 template <class Add>
-void search_cells(const Scene& scene, const Eigen::Matrix3Xd& fluid, const Eigen::Matrix3Xd& wall,
-                  double radius, Add add) {
+void search_cells(const Scene& scene, const Eigen::Matrix3Xd& fluid, const Eigen::Matrix3Xd& wall, double radius,
+                  Add add) {
   const CellList cells(scene, fluid, radius);
   std::vector<std::int32_t> near;
   for (std::int32_t j = 0; j < fluid.cols(); ++j) {
@@ -170,18 +164,15 @@ void find_neighbors(const Scene& scene, const Eigen::Matrix3Xd& fluid, const Eig
   clear(out.fluid, fluid.cols());
   clear(out.wall, fluid.cols());
   if (fluid.cols() == 0) return;
-  if (search == NeighborSearch::all_pairs)
-    search_all_pairs(scene, fluid, wall, out);
+  if (search == NeighborSearch::all_pairs) search_all_pairs(scene, fluid, wall, out);
   else
-    search_cells(scene, fluid, wall, scene.support_radius(),
-                 [&](std::int32_t i, std::int32_t j, bool is_wall) {
-                   (is_wall ? out.wall : out.fluid)[i].push_back(j);
-                 });
+    search_cells(scene, fluid, wall, scene.support_radius(), [&](std::int32_t i, std::int32_t j, bool is_wall) {
+      (is_wall ? out.wall : out.fluid)[i].push_back(j);
+    });
 }
 
-void find_neighbors_and_shell(const Scene& scene, const Eigen::Matrix3Xd& fluid,
-                              const Eigen::Matrix3Xd& wall, double shell, Neighbors& out,
-                              Neighbors& near_H) {
+void find_neighbors_and_shell(const Scene& scene, const Eigen::Matrix3Xd& fluid, const Eigen::Matrix3Xd& wall,
+                              double shell, Neighbors& out, Neighbors& near_H) {
   for (Neighbors* lists : {&out, &near_H}) {
     clear(lists->fluid, fluid.cols());
     clear(lists->wall, fluid.cols());

@@ -34,8 +34,7 @@ class Separation {
     if (any_)
       for (int a = 0; a < 3; ++a)
         // Nearer than half a period nothing is to be rounded.
-        if (const auto period = static_cast<Real>(period_[a]);
-            period > 0 && !(std::abs(x_ij[a]) < period / 2))
+        if (const auto period = static_cast<Real>(period_[a]); period > 0 && !(std::abs(x_ij[a]) < period / 2))
           x_ij[a] -= period * std::round(x_ij[a] / period);
     return x_ij;
   }
@@ -55,8 +54,7 @@ void find_neighbors(const Scene& scene, const Eigen::Matrix3Xd& fluid, const Eig
 
 /// The same lists, and in `near_H` the pairs with H − shell <= r < H + shell, from one search.
 /// \param shell  m, > 0
-void find_neighbors_and_shell(const Scene& scene, const Eigen::Matrix3Xd& fluid,
-                              const Eigen::Matrix3Xd& wall, double shell, Neighbors& out,
-                              Neighbors& near_H);
+void find_neighbors_and_shell(const Scene& scene, const Eigen::Matrix3Xd& fluid, const Eigen::Matrix3Xd& wall,
+                              double shell, Neighbors& out, Neighbors& near_H);
 
 }  // namespace decant

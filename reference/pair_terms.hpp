@@ -43,23 +43,22 @@ Vector3<Real> pressure_term(Real mass, Real q_i, Real q_j, Real G, const Vector3
 
 /// rho0 V_b q_i G x_ib, m/s². Source: Akinci et al. 2012, eq. 9.
 template <class Real>
-Vector3<Real> wall_pressure_term(Real rest_density, Real boundary_volume, Real q_i, Real G,
-                                 const Vector3<Real>& x_ib) {
+Vector3<Real> wall_pressure_term(Real rest_density, Real boundary_volume, Real q_i, Real G, const Vector3<Real>& x_ib) {
   return rest_density * boundary_volume * q_i * G * x_ib;
 }
 
 /// (mu/rho_i)(m/rho_j)(v_j − v_i) L, m/s². Antisymmetric for equal masses up to rounding.
 /// Sources: Müller et al. 2003, eq. 14; Morris et al. 1997, eq. 22.
 template <class Real>
-Vector3<Real> viscous_term(Real viscosity, Real mass, Real density_i, Real density_j,
-                           const Vector3<Real>& v_i, const Vector3<Real>& v_j, Real L) {
+Vector3<Real> viscous_term(Real viscosity, Real mass, Real density_i, Real density_j, const Vector3<Real>& v_i,
+                           const Vector3<Real>& v_j, Real L) {
   return viscosity / density_i * (mass / density_j) * L * (v_j - v_i);
 }
 
 /// (mu_w/rho_i) V_b (v_b − v_i) L, m/s². Source: the viscous term above with m/rho_j → V_b.
 template <class Real>
-Vector3<Real> wall_viscous_term(Real wall_viscosity, Real boundary_volume, Real density_i,
-                                const Vector3<Real>& v_i, const Vector3<Real>& v_b, Real L) {
+Vector3<Real> wall_viscous_term(Real wall_viscosity, Real boundary_volume, Real density_i, const Vector3<Real>& v_i,
+                                const Vector3<Real>& v_b, Real L) {
   return wall_viscosity / density_i * boundary_volume * L * (v_b - v_i);
 }
 

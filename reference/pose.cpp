@@ -16,15 +16,14 @@ struct Progress {
 
 /// \param value_of  of a key; \param rate  after the last key
 template <class Value, class Key, class ValueOf>
-Progress<Value> along_keys(const std::vector<Key>& keys, ValueOf value_of, const Value& rate,
-                           const Value& none, double time) {
+Progress<Value> along_keys(const std::vector<Key>& keys, ValueOf value_of, const Value& rate, const Value& none,
+                           double time) {
   const Value last = value_of(keys.back());
   if (time >= keys.back().time)
-    return rate == none ? Progress<Value>{last, none}
-                        : Progress<Value>{last + rate * (time - keys.back().time), rate};
+    return rate == none ? Progress<Value>{last, none} : Progress<Value>{last + rate * (time - keys.back().time), rate};
   if (time <= keys.front().time) return {value_of(keys.front()), none};
-  const auto next = std::upper_bound(keys.begin(), keys.end(), time,
-                                     [](double t, const Key& key) { return t < key.time; });
+  const auto next =
+      std::upper_bound(keys.begin(), keys.end(), time, [](double t, const Key& key) { return t < key.time; });
   const auto k = static_cast<std::size_t>(next - keys.begin());
   const Value before = value_of(keys[k - 1]);
   const double span = keys[k].time - keys[k - 1].time;
@@ -50,15 +49,14 @@ void add(const std::optional<Oscillation<Value>>& oscillation, double time, Prog
 }  // namespace
 
 TiltAngle tilt_at(const Tilt& tilt, double time) {
-  auto at = along_keys<double>(tilt.keys, [](const TiltKey& k) { return k.angle; }, tilt.rate, 0.0,
-                               time);
+  auto at = along_keys<double>(tilt.keys, [](const TiltKey& k) { return k.angle; }, tilt.rate, 0.0, time);
   add(tilt.oscillation, time, at);
   return {at.value, at.rate};
 }
 
 TranslationOffset translation_at(const Translation& translation, double time) {
-  auto at = along_keys<Vec3>(translation.keys, [](const TranslationKey& k) { return k.offset; },
-                             translation.velocity, Vec3::Zero(), time);
+  auto at = along_keys<Vec3>(
+      translation.keys, [](const TranslationKey& k) { return k.offset; }, translation.velocity, Vec3::Zero(), time);
   add(translation.oscillation, time, at);
   return {at.value, at.rate};
 }

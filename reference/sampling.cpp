@@ -81,8 +81,7 @@ std::vector<Vec3> sample_revolved(const Scene& scene, const RevolvedShape& shape
   std::vector<Vec3> points;
   int ring = 0;
   for (int layer = 0; layer < scene.wall_layers; ++layer)
-    for (const Point2& p : inset_points(edges, (layer + 0.5) * scene.particle_spacing,
-                                        scene.particle_spacing)) {
+    for (const Point2& p : inset_points(edges, (layer + 0.5) * scene.particle_spacing, scene.particle_spacing)) {
       const double around = 2 * std::numbers::pi * p.x();
       const int n = std::max(1, static_cast<int>(std::lround(around / scene.particle_spacing)));
       // Rings start at unrelated angles, so that no seam runs up the cup.
@@ -99,8 +98,7 @@ std::vector<Vec3> sample_boxes(const Scene& scene, const BoxShape& shape) {
   const auto faces = exposed_faces(shape);
   const Vec3 extent = shape.cavity.max - shape.cavity.min;
   Vec3 spacing;
-  for (int a = 0; a < 3; ++a)
-    spacing[a] = extent[a] / std::max(1.0, std::round(extent[a] / scene.particle_spacing));
+  for (int a = 0; a < 3; ++a) spacing[a] = extent[a] / std::max(1.0, std::round(extent[a] / scene.particle_spacing));
   // Depth counted along the axes, so that corners belong to the layer a lattice gives them.
   const auto layers_deep = [&](const Vec3& x) {
     double depth = INFINITY;
@@ -116,10 +114,8 @@ std::vector<Vec3> sample_boxes(const Scene& scene, const BoxShape& shape) {
     const std::vector<SolidBox> earlier(shape.solid.begin(), shape.solid.begin() + b);
     std::array<int, 3> low, high;
     for (int a = 0; a < 3; ++a) {
-      low[a] = static_cast<int>(
-          std::ceil((box.min[a] - shape.cavity.min[a]) / spacing[a] - 0.5 - 1e-6));
-      high[a] = static_cast<int>(
-          std::floor((box.max[a] - shape.cavity.min[a]) / spacing[a] - 0.5 + 1e-6));
+      low[a] = static_cast<int>(std::ceil((box.min[a] - shape.cavity.min[a]) / spacing[a] - 0.5 - 1e-6));
+      high[a] = static_cast<int>(std::floor((box.max[a] - shape.cavity.min[a]) / spacing[a] - 0.5 + 1e-6));
     }
     for (int k = low[2]; k <= high[2]; ++k)
       for (int j = low[1]; j <= high[1]; ++j)
@@ -136,8 +132,7 @@ RenderSurface revolved_surface(const RevolvedShape& shape, double spacing) {
   const auto edges = surface_edges(shape);
   double widest = 0;
   for (const auto& e : edges) widest = std::max({widest, e.r0, e.r1});
-  const int around =
-      std::max(12, static_cast<int>(std::ceil(2 * std::numbers::pi * widest / spacing)));
+  const int around = std::max(12, static_cast<int>(std::ceil(2 * std::numbers::pi * widest / spacing)));
   RenderSurface surface;
   std::vector<Vec3> vertices;
   for (const auto& e : edges) {
@@ -194,8 +189,8 @@ RenderSurface box_surface(const BoxShape& shape, double spacing) {
 
 BoundaryParticles sample_walls(const Scene& scene, const Container& container) {
   const auto* revolved = std::get_if<RevolvedShape>(&container.shape);
-  const auto points = revolved ? sample_revolved(scene, *revolved)
-                               : sample_boxes(scene, std::get<BoxShape>(container.shape));
+  const auto points =
+      revolved ? sample_revolved(scene, *revolved) : sample_boxes(scene, std::get<BoxShape>(container.shape));
   return {columns(points).cast<float>().cast<double>()};
 }
 
@@ -206,8 +201,7 @@ Walls sample_walls(const Scene& scene) {
 }
 
 RenderSurface render_surface(const Container& container, double spacing) {
-  if (const auto* revolved = std::get_if<RevolvedShape>(&container.shape))
-    return revolved_surface(*revolved, spacing);
+  if (const auto* revolved = std::get_if<RevolvedShape>(&container.shape)) return revolved_surface(*revolved, spacing);
   return box_surface(std::get<BoxShape>(container.shape), spacing);
 }
 

@@ -86,8 +86,8 @@ struct SolidBox {
 /// Union of axis-aligned boxes around a cavity (a tank, a channel). Where a periodic axis cuts the
 /// solid, the cut is not surface.
 struct BoxShape {
-  SolidBox cavity;              // the room for fluid; decides "in which container"
-  std::vector<SolidBox> solid;  // may touch and overlap
+  SolidBox cavity;                                      // the room for fluid; decides "in which container"
+  std::vector<SolidBox> solid;                          // may touch and overlap
   std::array<bool, 3> endless = {false, false, false};  // the domain's periodic axes
 };
 
@@ -104,9 +104,9 @@ struct Container {
 
 /// A ball, or a rod along one axis.
 struct RoundShape {
-  Vec3 center;     // m
-  double radius;   // m
-  int axis = -1;   // 0 … 2: of a rod; −1: a ball
+  Vec3 center;        // m
+  double radius;      // m
+  int axis = -1;      // 0 … 2: of a rod; −1: a ball
   double length = 0;  // m, of a rod, half of it on either side of the center
 
   SolidBox bounds() const {
@@ -123,16 +123,14 @@ struct Fill {
   double level = 0;             // m above the cavity's bottom (container) — unused for a shape
   std::optional<SolidBox> box;  // m, world, or container frame where a container is named
   // v(x) = velocity + velocity_gradient (x − gradient_about), world
-  Vec3 velocity = Vec3::Zero();                                // m/s
+  Vec3 velocity = Vec3::Zero();                                 // m/s
   Eigen::Matrix3d velocity_gradient = Eigen::Matrix3d::Zero();  // 1/s
   Vec3 gradient_about = Vec3::Zero();                           // m
-  std::optional<RoundShape> round = std::nullopt;  // what there is of `box`, its bounds
+  std::optional<RoundShape> round = std::nullopt;               // what there is of `box`, its bounds
   /// Names of containers within the fluid: no particle starts within dx/2 of their solids.
   std::vector<std::string> around = {};
 
-  Vec3 velocity_at(const Vec3& x) const {
-    return velocity + velocity_gradient * (x - gradient_about);
-  }
+  Vec3 velocity_at(const Vec3& x) const { return velocity + velocity_gradient * (x - gradient_about); }
 };
 
 /// Analytic plane z = height without wall particles.
@@ -142,7 +140,7 @@ struct Floor {
 
 /// Where particles may be. Leaving it is an error on a free axis and a wrap on a periodic one.
 struct Domain {
-  Vec3 min, max;                                       // m
+  Vec3 min, max;  // m
   std::array<bool, 3> periodic = {false, false, false};
 };
 
@@ -153,12 +151,12 @@ struct Contact {
 };
 
 struct Schedule {
-  double end = 0;                         // s
-  int frames = 1;                         // written after the initial one
-  int substeps_per_frame = 0;             // 0: not derived yet
-  bool substeps_derived = true;           // false: the scene sets them, and no rule changes them
-  double courant = 0.4;                   // dt <= courant · h / (c0 + v_max)
-  std::optional<double> max_speed;        // m/s; replaces the estimate from the fall height
+  double end = 0;                   // s
+  int frames = 1;                   // written after the initial one
+  int substeps_per_frame = 0;       // 0: not derived yet
+  bool substeps_derived = true;     // false: the scene sets them, and no rule changes them
+  double courant = 0.4;             // dt <= courant · h / (c0 + v_max)
+  std::optional<double> max_speed;  // m/s; replaces the estimate from the fall height
 };
 
 struct Scene {
@@ -166,7 +164,7 @@ struct Scene {
   double particle_spacing = 0;  // dx, m
   double support_ratio = 2.0;   // H / dx
   KernelFamily kernel = KernelFamily::cubic_spline;
-  double mass_ratio = 1.0;      // m / (rho0 dx³); a family that starts compressed is calibrated here
+  double mass_ratio = 1.0;  // m / (rho0 dx³); a family that starts compressed is calibrated here
   FluidProperties fluid;
   Vec3 gravity = Vec3(0, 0, -9.81);  // m/s², or any constant body force
   Domain domain;

@@ -16,13 +16,10 @@
 namespace decant {
 namespace {
 
-std::string at(const std::string& list, std::size_t index) {
-  return list + "[" + std::to_string(index) + "]";
-}
+std::string at(const std::string& list, std::size_t index) { return list + "[" + std::to_string(index) + "]"; }
 
 std::string point_text(const Vec3& x) {
-  return "(" + to_text(rounded(x.x())) + ", " + to_text(rounded(x.y())) + ", " +
-         to_text(rounded(x.z())) + ")";
+  return "(" + to_text(rounded(x.x())) + ", " + to_text(rounded(x.y())) + ", " + to_text(rounded(x.z())) + ")";
 }
 
 /// Lengths are compared with this much slack, so that decimal fractions that meet do meet.
@@ -45,8 +42,7 @@ class Checks {
 
  private:
   /// \param holds  written so that a NaN in it refuses
-  void require(bool holds, const std::string& key, const std::string& value,
-               const std::string& bound) const {
+  void require(bool holds, const std::string& key, const std::string& value, const std::string& bound) const {
     if (!holds) throw InputError(file_, key, value, bound);
   }
 
@@ -70,8 +66,7 @@ class Checks {
 
   void domain() {
     const double dx = scene_.particle_spacing;
-    const double reach =
-        scene_.domain.min.cwiseAbs().cwiseMax(scene_.domain.max.cwiseAbs()).maxCoeff();
+    const double reach = scene_.domain.min.cwiseAbs().cwiseMax(scene_.domain.max.cwiseAbs()).maxCoeff();
     // Half an ulp of the largest fp32 coordinate is at most reach · 2⁻²⁴.
     const double farthest = 1e-3 * dx * 0x1p24;
     require(reach <= farthest, "domain", to_text(reach),
@@ -87,9 +82,8 @@ class Checks {
               "a period >= 3 H = " + to_text(least) + ", not " + to_text(extent[a]));
       const double cells = extent[a] / dx;
       if (std::abs(cells - std::round(cells)) > 1e-6 * cells)
-        warnings_.push_back(
-            "domain: the period along " + axis_name(a) + " is " + to_text(rounded(cells)) +
-            " particle spacings, not a whole number; a fill across it leaves a gap");
+        warnings_.push_back("domain: the period along " + axis_name(a) + " is " + to_text(rounded(cells)) +
+                            " particle spacings, not a whole number; a fill across it leaves a gap");
     }
   }
 
@@ -101,12 +95,9 @@ class Checks {
               "a name of its own; " + at("containers", j) + " has it already");
     const double support = scene_.support_radius();
     const double layers = scene_.wall_layers * scene_.particle_spacing;
-    require(
-        c.wall_thickness >= support - tolerance(scene_), key + ".wall_thickness",
-        to_text(c.wall_thickness),
-        ">= H = " + to_text(support) + "; the support would reach through the wall of " + c.name);
-    require(c.wall_thickness >= layers - tolerance(scene_), key + ".wall_thickness",
-            to_text(c.wall_thickness),
+    require(c.wall_thickness >= support - tolerance(scene_), key + ".wall_thickness", to_text(c.wall_thickness),
+            ">= H = " + to_text(support) + "; the support would reach through the wall of " + c.name);
+    require(c.wall_thickness >= layers - tolerance(scene_), key + ".wall_thickness", to_text(c.wall_thickness),
             ">= wall_layers · dx = " + to_text(layers) + "; the layers would leave the solid");
     if (c.tilt) tilt(c, key + ".tilt");
     if (c.translation) translation(c, key + ".translation");
@@ -117,17 +108,13 @@ class Checks {
   void tilt(const Container& c, const std::string& key) {
     schedule(c.tilt->keys, key, [](const TiltKey& k) { return Vec3(k.angle, 0, 0); });
     require(std::isfinite(c.tilt->rate), key + ".rate", to_text(c.tilt->rate), "a finite number");
-    if (c.tilt->oscillation)
-      oscillation(*c.tilt->oscillation, Vec3(c.tilt->oscillation->amplitude, 0, 0), key);
-    require(std::abs(c.tilt->axis.norm() - 1) < 1e-6, key + ".axis", point_text(c.tilt->axis),
-            "a unit vector");
+    if (c.tilt->oscillation) oscillation(*c.tilt->oscillation, Vec3(c.tilt->oscillation->amplitude, 0, 0), key);
+    require(std::abs(c.tilt->axis.norm() - 1) < 1e-6, key + ".axis", point_text(c.tilt->axis), "a unit vector");
     const Vec3& pivot = c.tilt->pivot;
-    require((pivot.array() >= scene_.domain.min.array()).all() &&
-                (pivot.array() <= scene_.domain.max.array()).all(),
+    require((pivot.array() >= scene_.domain.min.array()).all() && (pivot.array() <= scene_.domain.max.array()).all(),
             key + ".pivot", point_text(pivot), "a point in the domain");
     for (int a = 0; a < 3; ++a)
-      require(!periodic(a), key, "tilts",
-              "no tilt, because the domain is periodic along " + axis_name(a));
+      require(!periodic(a), key, "tilts", "no tilt, because the domain is periodic along " + axis_name(a));
   }
 
   void translation(const Container& c, const std::string& key) {
@@ -151,8 +138,7 @@ class Checks {
     require(!keys.empty(), key + ".keys", "[]", "at least one key");
     for (std::size_t k = 0; k < keys.size(); ++k) {
       const std::string here = key + "." + at("keys", k);
-      require(std::isfinite(keys[k].time) && value(keys[k]).allFinite(), here,
-              to_text(keys[k].time), "finite numbers");
+      require(std::isfinite(keys[k].time) && value(keys[k]).allFinite(), here, to_text(keys[k].time), "finite numbers");
       require(k == 0 || keys[k].time > keys[k - 1].time, here + ".time", to_text(keys[k].time),
               "later than the key before it");
     }
@@ -160,47 +146,41 @@ class Checks {
 
   template <class Value>
   void oscillation(const Oscillation<Value>& o, const Vec3& amplitude, const std::string& key) {
-    require(amplitude.allFinite() && std::isfinite(o.phase), key + ".oscillation",
-            point_text(amplitude), "finite numbers");
-    require(o.frequency > 0 && std::isfinite(o.frequency), key + ".oscillation.frequency",
-            to_text(o.frequency), "> 0, Hz");
+    require(amplitude.allFinite() && std::isfinite(o.phase), key + ".oscillation", point_text(amplitude),
+            "finite numbers");
+    require(o.frequency > 0 && std::isfinite(o.frequency), key + ".oscillation.frequency", to_text(o.frequency),
+            "> 0, Hz");
   }
 
   /// Along a periodic axis every box of a union, its cavity too, goes from end to end.
   void spans_periods(const Container& c, const BoxShape& shape, const std::string& key) {
     for (int a = 0; a < 3; ++a) {
-      require(shape.endless[static_cast<std::size_t>(a)] == periodic(a), key + ".boxes",
-              axis_name(a), "endless along the domain's periodic axes and no other");
+      require(shape.endless[static_cast<std::size_t>(a)] == periodic(a), key + ".boxes", axis_name(a),
+              "endless along the domain's periodic axes and no other");
       if (!periodic(a)) continue;
       const double slack = 1e-9 * (scene_.domain.max[a] - scene_.domain.min[a]);
       std::vector<SolidBox> boxes = shape.solid;
       boxes.push_back(shape.cavity);
       for (const auto& box : boxes) {
         const double from = c.origin[a] + box.min[a], to = c.origin[a] + box.max[a];
-        require(std::abs(from - scene_.domain.min[a]) <= slack &&
-                    std::abs(to - scene_.domain.max[a]) <= slack,
-                key, axis_name(a) + " from " + to_text(from) + " to " + to_text(to),
-                "exactly the period, from " + to_text(scene_.domain.min[a]) + " to " +
-                    to_text(scene_.domain.max[a]) + ", because the domain is periodic along " +
-                    axis_name(a));
+        require(std::abs(from - scene_.domain.min[a]) <= slack && std::abs(to - scene_.domain.max[a]) <= slack, key,
+                axis_name(a) + " from " + to_text(from) + " to " + to_text(to),
+                "exactly the period, from " + to_text(scene_.domain.min[a]) + " to " + to_text(scene_.domain.max[a]) +
+                    ", because the domain is periodic along " + axis_name(a));
       }
     }
   }
 
   void inside_domain(const Container& c, const std::string& key) {
     const auto rings = solid_rings(c);
-    const std::string place =
-        key + (c.tilt ? ".tilt" : c.translation ? ".translation" : ".origin");
-    const auto reach = [&](const Vec3& direction) {
-      return farthest_along(direction, rings, &c, scene_.schedule.end);
-    };
+    const std::string place = key + (c.tilt ? ".tilt" : c.translation ? ".translation" : ".origin");
+    const auto reach = [&](const Vec3& direction) { return farthest_along(direction, rings, &c, scene_.schedule.end); };
     const bool revolved = std::holds_alternative<RevolvedShape>(c.shape);
     for (int a = 0; a < 3; ++a) {
       if (periodic(a) && !revolved) continue;
       // The image beyond a periodic boundary is as near as the boundary twice.
       const double margin = periodic(a) ? scene_.support_radius() : 0.0;
-      const std::string why =
-          periodic(a) ? ", H inside the periodic boundary" : ", the domain's end";
+      const std::string why = periodic(a) ? ", H inside the periodic boundary" : ", the domain's end";
       const double low = -reach(-Vec3::Unit(a)), high = reach(Vec3::Unit(a));
       require(low >= scene_.domain.min[a] + margin - tolerance(scene_), place,
               c.name + " reaches " + axis_name(a) + " = " + to_text(rounded(low)),
@@ -211,16 +191,14 @@ class Checks {
     }
     if (!scene_.floor) return;
     const double low = -reach(-Vec3::UnitZ());
-    require(low >= scene_.floor->height - tolerance(scene_), place,
-            c.name + " reaches z = " + to_text(rounded(low)),
+    require(low >= scene_.floor->height - tolerance(scene_), place, c.name + " reaches z = " + to_text(rounded(low)),
             ">= " + to_text(scene_.floor->height) + ", the floor's height");
   }
 
   void clearance(std::size_t i, std::size_t j) {
     const Container &a = scene_.containers[i], &b = scene_.containers[j];
     const double support = scene_.support_radius();
-    const Approach near =
-        closest_approach(a, b, scene_.schedule.end, support - tolerance(scene_), 0.05 * support);
+    const Approach near = closest_approach(a, b, scene_.schedule.end, support - tolerance(scene_), 0.05 * support);
     if (near.distance >= support - tolerance(scene_)) return;
     require(false, at("containers", i),
             a.name + " and " + b.name +
@@ -244,18 +222,16 @@ class Checks {
       const double percent = 100 * (fastest / sound) * (fastest / sound);
       warnings_.push_back("fluid.sound_speed = " + to_text(sound) +
                           ": below 10 v_max = " + to_text(rounded(10 * fastest)) + reason +
-                          "; expect the fluid to compress by up to " + to_text(rounded(percent)) +
-                          " %");
+                          "; expect the fluid to compress by up to " + to_text(rounded(percent)) + " %");
     }
     const int substeps = s.substeps_per_frame;
     require(substeps >= 1, "time.substeps_per_frame", std::to_string(substeps), "at least 1");
     const double cfl_bound = 0.4 * scene_.smoothing_length() / (sound + fastest);
     const double bound = longest_time_step(scene_, 0.4, fastest);
     const double frame = s.end / s.frames;
-    require(scene_.time_step() <= bound * (1 + 1e-12), "time.substeps_per_frame",
-            std::to_string(substeps),
-            ">= " + to_text(std::ceil(frame / bound)) +
-                ": dt = " + to_text(rounded(scene_.time_step())) + " s passes " +
+    require(scene_.time_step() <= bound * (1 + 1e-12), "time.substeps_per_frame", std::to_string(substeps),
+            ">= " + to_text(std::ceil(frame / bound)) + ": dt = " + to_text(rounded(scene_.time_step())) +
+                " s passes " +
                 (bound < cfl_bound ? "the viscous limit 0.125 h² rho0 / max(mu, mu_w / 2) = "
                                    : "the CFL limit 0.4 h / (c0 + v_max) = ") +
                 to_text(rounded(bound)) + " s");
@@ -280,8 +256,6 @@ class Checks {
 
 }  // namespace
 
-std::vector<std::string> check_scene(const Scene& scene, const std::string& file) {
-  return Checks(scene, file).run();
-}
+std::vector<std::string> check_scene(const Scene& scene, const std::string& file) { return Checks(scene, file).run(); }
 
 }  // namespace decant

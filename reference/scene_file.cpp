@@ -19,8 +19,7 @@ namespace {
 const Range unit_interval{.low = 0.0, .high = 1.0};
 
 template <typename T>
-T optional_or(const JsonValue& object, const std::string& key, T otherwise,
-              T (*read)(const JsonValue&)) {
+T optional_or(const JsonValue& object, const std::string& key, T otherwise, T (*read)(const JsonValue&)) {
   return object.has(key) ? read(object[key]) : otherwise;
 }
 
@@ -49,8 +48,7 @@ SolidBox read_box(const JsonValue& v, const std::string& keys) {
   const SolidBox box{v["min"].vector(coordinate), v["max"].vector(coordinate)};
   for (int a = 0; a < 3; ++a)
     if (!(box.min[a] < box.max[a]))
-      v["max"].elements(3, 3)[static_cast<std::size_t>(a)].refuse("greater than min, which is " +
-                                                                  to_text(box.min[a]));
+      v["max"].elements(3, 3)[static_cast<std::size_t>(a)].refuse("greater than min, which is " + to_text(box.min[a]));
   return box;
 }
 
@@ -70,15 +68,13 @@ Contact read_contact(const JsonValue& v) {
   v.check_keys(keys_of("contact"));
   Contact contact;
   // The lattice starts dx/2 from the walls: a longer contact distance would move it at once.
-  if (v.has("distance_ratio"))
-    contact.distance_ratio = v["distance_ratio"].number({.low = 0.0, .high = 0.5});
+  if (v.has("distance_ratio")) contact.distance_ratio = v["distance_ratio"].number({.low = 0.0, .high = 0.5});
   contact.restitution = optional_or(v, "restitution", contact.restitution, read_unit_interval);
   contact.friction = optional_or(v, "friction", contact.friction, read_non_negative);
   return contact;
 }
 
-double cross(const std::array<double, 2>& o, const std::array<double, 2>& a,
-             const std::array<double, 2>& b) {
+double cross(const std::array<double, 2>& o, const std::array<double, 2>& a, const std::array<double, 2>& b) {
   return (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0]);
 }
 
@@ -87,8 +83,7 @@ RevolvedShape read_profile(const JsonValue& v) {
   const auto points = v.elements(3, 1000);
   for (const auto& point : points) {
     const auto rz = point.elements(2, 2);
-    shape.profile.push_back(
-        {rz[0].number({.low = 0.0, .high = coordinate.high}), rz[1].number(coordinate)});
+    shape.profile.push_back({rz[0].number({.low = 0.0, .high = coordinate.high}), rz[1].number(coordinate)});
   }
   const auto& p = shape.profile;
   const std::size_t n = p.size();
@@ -128,16 +123,16 @@ BoxShape read_tank(const JsonValue& v, const Domain& domain, double& wall_thickn
     const bool both_open = open[a][0] && open[a][1];
     if (domain.periodic[a] && !both_open) {
       const char axis = "xyz"[a];
-      const std::string bound = std::string("both -") + axis + " and +" + axis +
-                                ", because the domain is periodic along " + axis;
+      const std::string bound =
+          std::string("both -") + axis + " and +" + axis + ", because the domain is periodic along " + axis;
       if (v.has("open")) v["open"].refuse(bound);
       throw InputError(v.file(), v.path() + ".open", "missing", bound);
     }
     // The walls end where a face is open, so the tank's extent is theirs.
     const auto axis = static_cast<Eigen::Index>(a);
     if (both_open && !domain.periodic[a] && size[axis] < wall_thickness)
-      v["size"].elements(3, 3)[a].refuse("no less than wall_thickness, which is " +
-                                         to_text(wall_thickness) + ", where both faces are open");
+      v["size"].elements(3, 3)[a].refuse("no less than wall_thickness, which is " + to_text(wall_thickness) +
+                                         ", where both faces are open");
   }
   return tank_shape(size, wall_thickness, open);
 }
@@ -162,16 +157,16 @@ Container read_container(const JsonValue& v, const Domain& domain) {
   v.check_keys(keys_of("container"));
   Container container;
   container.name = v["name"].name();
-  container.origin = optional_or<Vec3>(v, "origin", Vec3::Zero(),
-                                       [](const JsonValue& o) { return o.vector(coordinate); });
+  container.origin =
+      optional_or<Vec3>(v, "origin", Vec3::Zero(), [](const JsonValue& o) { return o.vector(coordinate); });
   if (v.has("cup") + v.has("tank") + v.has("revolved") + v.has("boxes") != 1)
     v.refuse("exactly one of cup, tank, revolved, boxes");
   if (v.has("cup")) {
     const JsonValue cup = v["cup"];
     cup.check_keys(keys_of("cup"));
     container.wall_thickness = cup["wall_thickness"].number(positive);
-    container.shape = cup_shape(cup["inner_radius"].number(positive),
-                                cup["inner_height"].number(positive), container.wall_thickness);
+    container.shape =
+        cup_shape(cup["inner_radius"].number(positive), cup["inner_height"].number(positive), container.wall_thickness);
   } else if (v.has("revolved")) {
     const JsonValue revolved = v["revolved"];
     revolved.check_keys(keys_of("revolved"));
@@ -239,8 +234,7 @@ Fill read_fill(const JsonValue& v, const std::vector<Container>& containers) {
     gradient.check_keys(keys_of("velocity_gradient"));
     const auto rows = gradient["matrix"].elements(3, 3);
     for (Eigen::Index a = 0; a < 3; ++a)
-      fill.velocity_gradient.row(a) = rows[static_cast<std::size_t>(a)].vector(
-          {.low = -1e6, .high = 1e6}).transpose();
+      fill.velocity_gradient.row(a) = rows[static_cast<std::size_t>(a)].vector({.low = -1e6, .high = 1e6}).transpose();
     fill.gradient_about = gradient["about"].vector(coordinate);
   }
   return fill;
@@ -251,10 +245,8 @@ Schedule read_time(const JsonValue& v) {
   Schedule schedule;
   schedule.end = v["end"].number(positive);
   schedule.frames = v["frames"].integer(1, 1000000);
-  if (v.has("courant"))
-    schedule.courant = v["courant"].number({.low = 0.0, .high = 0.4, .low_open = true});
-  if (v.has("substeps_per_frame"))
-    schedule.substeps_per_frame = v["substeps_per_frame"].integer(1, 1000000000);
+  if (v.has("courant")) schedule.courant = v["courant"].number({.low = 0.0, .high = 0.4, .low_open = true});
+  if (v.has("substeps_per_frame")) schedule.substeps_per_frame = v["substeps_per_frame"].integer(1, 1000000000);
   schedule.substeps_derived = !v.has("substeps_per_frame");
   if (v.has("substeps_derived")) {
     schedule.substeps_derived = v["substeps_derived"].boolean();
@@ -271,11 +263,9 @@ const std::vector<ObjectKeys>& scene_file_keys() {
   static const std::vector<ObjectKeys> keys = {
       {"scene",
        {"decant_scene", "name", "particle_spacing", "fluid", "domain", "fill", "time"},
-       {"$schema", "kernel", "support_ratio", "mass_ratio", "gravity", "floor", "contact",
-        "wall_layers", "containers"}},
-      {"fluid",
-       {"rest_density", "sound_speed", "viscosity"},
-       {"eos_exponent", "allow_tension", "wall_viscosity"}},
+       {"$schema", "kernel", "support_ratio", "mass_ratio", "gravity", "floor", "contact", "wall_layers",
+        "containers"}},
+      {"fluid", {"rest_density", "sound_speed", "viscosity"}, {"eos_exponent", "allow_tension", "wall_viscosity"}},
       {"domain", {"min", "max"}, {"periodic"}},
       {"floor", {"height"}, {}},
       {"contact", {}, {"distance_ratio", "restitution", "friction"}},
@@ -293,15 +283,11 @@ const std::vector<ObjectKeys>& scene_file_keys() {
       {"translation", {}, {"keys", "velocity", "oscillation"}},
       {"translation_key", {"time", "offset"}, {}},
       {"translation_oscillation", {"amplitude", "frequency"}, {"phase"}},
-      {"fill",
-       {},
-       {"container", "level", "box", "ball", "rod", "around", "velocity", "velocity_gradient"}},
+      {"fill", {}, {"container", "level", "box", "ball", "rod", "around", "velocity", "velocity_gradient"}},
       {"ball", {"center", "radius"}, {}},
       {"rod", {"center", "radius", "axis", "length"}, {}},
       {"velocity_gradient", {"matrix", "about"}, {}},
-      {"time",
-       {"end", "frames"},
-       {"courant", "substeps_per_frame", "substeps_derived", "max_speed"}},
+      {"time", {"end", "frames"}, {"courant", "substeps_per_frame", "substeps_derived", "max_speed"}},
   };
   return keys;
 }
@@ -316,10 +302,8 @@ Scene parse_scene(std::string_view text, const std::string& file) {
   scene.name = v["name"].name();
   scene.particle_spacing = v["particle_spacing"].number({.low = 1e-6, .high = 1e3});
   if (v.has("kernel"))
-    scene.kernel = static_cast<KernelFamily>(
-        v["kernel"].choice({"cubic_spline", "wendland_c2", "mueller2003"}));
-  if (v.has("support_ratio"))
-    scene.support_ratio = v["support_ratio"].number({.low = 1.5, .high = 5.0});
+    scene.kernel = static_cast<KernelFamily>(v["kernel"].choice({"cubic_spline", "wendland_c2", "mueller2003"}));
+  if (v.has("support_ratio")) scene.support_ratio = v["support_ratio"].number({.low = 1.5, .high = 5.0});
   if (v.has("mass_ratio")) scene.mass_ratio = v["mass_ratio"].number({.low = 0.5, .high = 2.0});
   scene.fluid = read_fluid(v["fluid"]);
   if (v.has("gravity")) scene.gravity = v["gravity"].vector({.low = -1e4, .high = 1e4});
@@ -335,11 +319,9 @@ Scene parse_scene(std::string_view text, const std::string& file) {
       scene.containers.push_back(read_container(container, scene.domain));
       for (std::size_t k = 0; k + 1 < scene.containers.size(); ++k)
         if (scene.containers[k].name == scene.containers.back().name)
-          container["name"].refuse("a name of its own; containers[" + std::to_string(k) +
-                                   "] has it already");
+          container["name"].refuse("a name of its own; containers[" + std::to_string(k) + "] has it already");
     }
-  for (const auto& fill : v["fill"].elements(1, 1000))
-    scene.fills.push_back(read_fill(fill, scene.containers));
+  for (const auto& fill : v["fill"].elements(1, 1000)) scene.fills.push_back(read_fill(fill, scene.containers));
   scene.schedule = read_time(v["time"]);
   return scene;
 }
@@ -350,12 +332,10 @@ Scene load_scene(const std::filesystem::path& file, std::vector<std::string>* wa
   std::ifstream in(file, std::ios::binary);
   if (std::filesystem::is_directory(file, ignored) || !in)
     throw InputError(name, "(whole file)", "not readable", "a scene file");
-  return complete_scene({std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()}, name,
-                        warnings);
+  return complete_scene({std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()}, name, warnings);
 }
 
-Scene complete_scene(const std::string& text, const std::string& name,
-                     std::vector<std::string>* warnings) {
+Scene complete_scene(const std::string& text, const std::string& name, std::vector<std::string>* warnings) {
   Scene scene = parse_scene(text, name);
   try {
     if (scene.schedule.substeps_derived) scene.schedule.substeps_per_frame = substeps_for(scene);

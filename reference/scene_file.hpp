@@ -30,8 +30,7 @@ const std::vector<ObjectKeys>& scene_file_keys();
 /// unless the file sets them. Throws InputError; warnings go to `warnings` where one is given.
 Scene load_scene(const std::filesystem::path& file, std::vector<std::string>* warnings = nullptr);
 /// The same of a file's text.
-Scene complete_scene(const std::string& text, const std::string& file,
-                     std::vector<std::string>* warnings = nullptr);
+Scene complete_scene(const std::string& text, const std::string& file, std::vector<std::string>* warnings = nullptr);
 
 /// Canonical JSON of a scene, everything explicit; parse_scene(scene_to_json(s)) equals s bitwise.
 std::string scene_to_json(const Scene& scene);

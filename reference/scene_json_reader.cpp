@@ -69,10 +69,8 @@ class Whereabouts {
   std::string path() const {
     std::string path;
     for (const auto& level : levels_)
-      if (level.is_array)
-        path += "[" + std::to_string(level.index) + "]";
-      else if (level.key)
-        path = member_path(path, *level.key);
+      if (level.is_array) path += "[" + std::to_string(level.index) + "]";
+      else if (level.key) path = member_path(path, *level.key);
     return path;
   }
 
@@ -97,8 +95,7 @@ std::string place_of(std::string_view text, std::size_t byte) {
   const std::string_view before = text.substr(0, std::min(byte == 0 ? 0 : byte - 1, text.size()));
   const auto line = 1 + std::count(before.begin(), before.end(), '\n');
   const std::size_t line_start = before.rfind('\n') + 1;  // npos + 1 is 0
-  return "line " + std::to_string(line) + ", column " +
-         std::to_string(before.size() - line_start + 1);
+  return "line " + std::to_string(line) + ", column " + std::to_string(before.size() - line_start + 1);
 }
 
 /// The parser's message without its own label and position.
@@ -127,8 +124,7 @@ double rounded(double value) {
 std::string Range::text() const {
   const bool has_low = std::isfinite(low), has_high = std::isfinite(high);
   if (has_low && has_high)
-    return "a number in " + std::string(low_open ? "(" : "[") + to_text(low) + ", " +
-           to_text(high) + "]";
+    return "a number in " + std::string(low_open ? "(" : "[") + to_text(low) + ", " + to_text(high) + "]";
   if (has_low) return std::string("a number ") + (low_open ? "> " : ">= ") + to_text(low);
   if (has_high) return "a number <= " + to_text(high);
   return "a number";
@@ -140,12 +136,10 @@ void JsonValue::check_keys(const ObjectKeys& keys) const {
   known.insert(known.end(), keys.optional.begin(), keys.optional.end());
   for (const auto& [key, value] : json_->items())
     if (std::find(known.begin(), known.end(), key) == known.end())
-      JsonValue(value, file_, member_path(path_, key))
-          .refuse("no such key; known keys here: " + joined(known));
+      JsonValue(value, file_, member_path(path_, key)).refuse("no such key; known keys here: " + joined(known));
   for (const auto& key : keys.required)
     if (!has(key))
-      throw InputError(file_, member_path(path_, key), "missing",
-                       "a required key; known keys here: " + joined(known));
+      throw InputError(file_, member_path(path_, key), "missing", "a required key; known keys here: " + joined(known));
 }
 
 JsonValue JsonValue::operator[](const std::string& key) const {
@@ -157,12 +151,10 @@ std::vector<JsonValue> JsonValue::elements(std::size_t fewest, std::size_t most)
   const std::size_t n = json_->size();
   if (n < fewest || n > most)
     refuse("an array of " +
-           (fewest == most ? std::to_string(fewest)
-                           : std::to_string(fewest) + " to " + std::to_string(most)) +
+           (fewest == most ? std::to_string(fewest) : std::to_string(fewest) + " to " + std::to_string(most)) +
            " elements, not " + std::to_string(n));
   std::vector<JsonValue> all;
-  for (std::size_t i = 0; i < n; ++i)
-    all.emplace_back((*json_)[i], file_, path_ + "[" + std::to_string(i) + "]");
+  for (std::size_t i = 0; i < n; ++i) all.emplace_back((*json_)[i], file_, path_ + "[" + std::to_string(i) + "]");
   return all;
 }
 
@@ -174,12 +166,10 @@ double JsonValue::number(const Range& range) const {
 }
 
 int JsonValue::integer(int low, int high) const {
-  const std::string bound =
-      low == high ? "the integer " + std::to_string(low)
-                  : "an integer in [" + std::to_string(low) + ", " + std::to_string(high) + "]";
+  const std::string bound = low == high ? "the integer " + std::to_string(low)
+                                        : "an integer in [" + std::to_string(low) + ", " + std::to_string(high) + "]";
   if (!json_->is_number_integer()) refuse(bound);
-  if (json_->is_number_unsigned() && json_->get<std::uint64_t>() > std::uint64_t{1} << 62)
-    refuse(bound);
+  if (json_->is_number_unsigned() && json_->get<std::uint64_t>() > std::uint64_t{1} << 62) refuse(bound);
   const auto value = json_->get<std::int64_t>();
   if (value < low || value > high) refuse(bound);
   return static_cast<int>(value);
@@ -197,16 +187,14 @@ std::string JsonValue::text() const {
 
 std::string JsonValue::name() const {
   // It becomes part of paths: "." is the group itself to HDF5, and "-x" an option to programs.
-  const std::string bound =
-      "a name of 1 to 64 letters, digits, '.', '-' or '_', the first no '.' and no '-'";
+  const std::string bound = "a name of 1 to 64 letters, digits, '.', '-' or '_', the first no '.' and no '-'";
   if (!json_->is_string()) refuse(bound);
   const auto value = json_->get<std::string>();
   const bool plain = std::all_of(value.begin(), value.end(), [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
-           c == '-' || c == '_';
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '-' ||
+           c == '_';
   });
-  if (value.empty() || value.size() > 64 || !plain || value[0] == '.' || value[0] == '-')
-    refuse(bound);
+  if (value.empty() || value.size() > 64 || !plain || value[0] == '.' || value[0] == '-') refuse(bound);
   return value;
 }
 
@@ -223,9 +211,7 @@ Vec3 JsonValue::vector(const Range& range) const {
   return {parts[0].number(range), parts[1].number(range), parts[2].number(range)};
 }
 
-std::string JsonValue::shown() const {
-  return shorten(json_->dump(-1, ' ', false, json::error_handler_t::replace));
-}
+std::string JsonValue::shown() const { return shorten(json_->dump(-1, ' ', false, json::error_handler_t::replace)); }
 
 void JsonValue::refuse(const std::string& bound) const {
   throw InputError(file_, path_.empty() ? "(whole file)" : path_, shown(), bound);
@@ -240,10 +226,7 @@ json parse_json(std::string_view text, const std::string& file) {
   try {
     return json::parse(
         text.begin(), text.end(),
-        [&](int, json::parse_event_t event, json& parsed) {
-          return whereabouts.see(event, parsed);
-        },
-        true, true);
+        [&](int, json::parse_event_t event, json& parsed) { return whereabouts.see(event, parsed); }, true, true);
   } catch (const json::parse_error& error) {
     throw InputError(file, where(), place_of(text, error.byte),
                      "valid JSON (comments allowed); " + reason_of(error.what()));

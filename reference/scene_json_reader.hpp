@@ -22,9 +22,7 @@ struct Range {
   double high = std::numeric_limits<double>::infinity();
   bool low_open = false;  // true: `low` itself is refused
 
-  bool holds(double value) const {
-    return (low_open ? value > low : value >= low) && value <= high;
-  }
+  bool holds(double value) const { return (low_open ? value > low : value >= low) && value <= high; }
   /// As a reader of a message wants it: "a number > 0".
   std::string text() const;
 };

@@ -48,26 +48,21 @@ Tilt read_tilt(const JsonValue& v) {
   // A double has an angle of 1e6 rad within 1e-10.
   const Range turns{.low = -1e6, .high = 1e6};
   Tilt tilt{v["pivot"].vector(coordinate), read_axis(v["axis"]), {}};
-  if (v.has("keys") + v.has("rate") + v.has("oscillation") == 0)
-    v.refuse("at least one of keys, rate, oscillation");
+  if (v.has("keys") + v.has("rate") + v.has("oscillation") == 0) v.refuse("at least one of keys, rate, oscillation");
   if (v.has("keys"))
     for (const auto& key : v["keys"].elements(1, 10000)) {
       key.check_keys(keys_of("tilt_key"));
-      if (key.has("angle") == key.has("angle_deg"))
-        key.refuse("exactly one of angle (rad) and angle_deg");
+      if (key.has("angle") == key.has("angle_deg")) key.refuse("exactly one of angle (rad) and angle_deg");
       const double time = read_key_time(key, tilt.keys);
       constexpr double degree = std::numbers::pi / 180.0;
-      const double angle =
-          key.has("angle") ? key["angle"].number(turns) : key["angle_deg"].number(turns) * degree;
+      const double angle = key.has("angle") ? key["angle"].number(turns) : key["angle_deg"].number(turns) * degree;
       tilt.keys.push_back({time, angle});
     }
-  else
-    tilt.keys = {{0.0, 0.0}};
+  else tilt.keys = {{0.0, 0.0}};
   if (v.has("rate")) tilt.rate = v["rate"].number(turns);
   if (v.has("oscillation"))
-    tilt.oscillation =
-        read_oscillation<double>(v["oscillation"], "tilt_oscillation",
-                                 [&](const JsonValue& amplitude) { return amplitude.number(turns); });
+    tilt.oscillation = read_oscillation<double>(v["oscillation"], "tilt_oscillation",
+                                                [&](const JsonValue& amplitude) { return amplitude.number(turns); });
   return tilt;
 }
 
@@ -86,9 +81,9 @@ Translation read_translation(const JsonValue& v) {
   }
   if (v.has("velocity")) translation.velocity = v["velocity"].vector(speed);
   if (v.has("oscillation"))
-    translation.oscillation = read_oscillation<Vec3>(
-        v["oscillation"], "translation_oscillation",
-        [](const JsonValue& amplitude) { return amplitude.vector(coordinate); });
+    translation.oscillation =
+        read_oscillation<Vec3>(v["oscillation"], "translation_oscillation",
+                               [](const JsonValue& amplitude) { return amplitude.vector(coordinate); });
   return translation;
 }
 

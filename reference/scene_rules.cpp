@@ -57,8 +57,7 @@ double fastest_start(const Fill& fill, const std::vector<Ring>& rings, const Con
 double fastest_wall(const Scene& scene, const Container* own) {
   double fastest = 0;
   for (const auto& c : scene.containers)
-    fastest = std::max(fastest, c.surface_velocity.norm() +
-                                    (&c == own ? 0.0 : fastest_point(solid_rings(c), c)));
+    fastest = std::max(fastest, c.surface_velocity.norm() + (&c == own ? 0.0 : fastest_point(solid_rings(c), c)));
   return fastest;
 }
 
@@ -77,8 +76,7 @@ double longest_time_step(const Scene& scene, double courant, double max_speed) {
   const double h = scene.smoothing_length();
   // Wall terms reach half a particle's surroundings at most, so mu_w counts half.
   const double viscosity = std::max(scene.fluid.viscosity, 0.5 * scene.fluid.wall_viscosity);
-  const double viscous =
-      viscosity > 0 ? 0.125 * h * h * scene.fluid.rest_density / viscosity : infinity;
+  const double viscous = viscosity > 0 ? 0.125 * h * h * scene.fluid.rest_density / viscosity : infinity;
   return std::min(courant * h / (scene.fluid.sound_speed + max_speed), viscous);
 }
 
@@ -88,8 +86,8 @@ double expected_max_speed(const Scene& scene) {
   for (int a = 0; a < 3; ++a)
     if (scene.domain.periodic[static_cast<std::size_t>(a)] && scene.gravity[a] != 0.0)
       throw InputError(scene.name, "time.max_speed", "missing",
-                       "required (m/s), because gravity pulls along the periodic axis " +
-                           std::string(1, "xyz"[a]) + " and no fall height bounds the speed");
+                       "required (m/s), because gravity pulls along the periodic axis " + std::string(1, "xyz"[a]) +
+                           " and no fall height bounds the speed");
   const Vec3 up = gravity > 0 ? Vec3(-scene.gravity / gravity) : Vec3::UnitZ();
   const double caught = gravity > 0 ? catching_elevation(scene, up) : 0.0;
   double fastest = scene.fills.empty() ? fastest_wall(scene, nullptr) : 0.0;
@@ -99,22 +97,20 @@ double expected_max_speed(const Scene& scene) {
     double start = std::max(fastest_start(fill, rings, container), fastest_wall(scene, container));
     if (container) start = std::max(start, fastest_point(rings, *container));
     double fall = 0;
-    if (gravity > 0)
-      fall = std::max(0.0, farthest_along(up, rings, container, scene.schedule.end) - caught);
+    if (gravity > 0) fall = std::max(0.0, farthest_along(up, rings, container, scene.schedule.end) - caught);
     fastest = std::max(fastest, std::sqrt(start * start + 2 * gravity * fall));
   }
   return fastest;
 }
 
 int substeps_for(const Scene& scene) {
-  const double longest =
-      longest_time_step(scene, scene.schedule.courant, expected_max_speed(scene));
+  const double longest = longest_time_step(scene, scene.schedule.courant, expected_max_speed(scene));
   const double frame = scene.schedule.end / scene.schedule.frames;
   const double needed = std::ceil(frame / longest);
   if (!(needed < 1e9))
-    throw InputError(scene.name, "time.frames", std::to_string(scene.schedule.frames),
-                     "more frames or a shorter end: a frame would need " + to_text(needed) +
-                         " substeps, and 1e9 is the most");
+    throw InputError(
+        scene.name, "time.frames", std::to_string(scene.schedule.frames),
+        "more frames or a shorter end: a frame would need " + to_text(needed) + " substeps, and 1e9 is the most");
   Scene trial = scene;
   // From just below, so that rounding of the quotient cannot add one.
   trial.schedule.substeps_per_frame = std::max(1, static_cast<int>(needed) - 1);
@@ -144,8 +140,7 @@ Scene with_particles(Scene scene, std::int64_t particles) {
   for (int k = 0; k < 12 && best_error > close; ++k) {
     const std::int64_t count = count_at(spacing);
     // A spacing at which a fill holds nothing says only that it is too coarse.
-    spacing *=
-        count == 0 ? 0.5 : std::cbrt(static_cast<double>(count) / static_cast<double>(particles));
+    spacing *= count == 0 ? 0.5 : std::cbrt(static_cast<double>(count) / static_cast<double>(particles));
   }
   // The count jumps with the spacing, so the steps above can circle about the request.
   const double centre = best;

@@ -12,9 +12,7 @@ using json = nlohmann::ordered_json;  // keeps the order of the format's descrip
 
 json vector_json(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
-json box_json(const SolidBox& box) {
-  return {{"min", vector_json(box.min)}, {"max", vector_json(box.max)}};
-}
+json box_json(const SolidBox& box) { return {{"min", vector_json(box.min)}, {"max", vector_json(box.max)}}; }
 
 const char* kernel_name(KernelFamily family) {
   switch (family) {
@@ -38,15 +36,13 @@ json tilt_json(const Tilt& tilt) {
   for (const auto& key : tilt.keys) keys.push_back({{"time", key.time}, {"angle", key.angle}});
   json out = {{"pivot", vector_json(tilt.pivot)}, {"axis", vector_json(tilt.axis)}, {"keys", keys}};
   if (tilt.rate != 0) out["rate"] = tilt.rate;
-  if (const auto& o = tilt.oscillation)
-    out["oscillation"] = oscillation_json(o->amplitude, o->frequency, o->phase);
+  if (const auto& o = tilt.oscillation) out["oscillation"] = oscillation_json(o->amplitude, o->frequency, o->phase);
   return out;
 }
 
 json translation_json(const Translation& translation) {
   json keys = json::array();
-  for (const auto& key : translation.keys)
-    keys.push_back({{"time", key.time}, {"offset", vector_json(key.offset)}});
+  for (const auto& key : translation.keys) keys.push_back({{"time", key.time}, {"offset", vector_json(key.offset)}});
   json out = {{"keys", keys}};
   if (!translation.velocity.isZero(0)) out["velocity"] = vector_json(translation.velocity);
   if (const auto& o = translation.oscillation)
@@ -57,21 +53,17 @@ json translation_json(const Translation& translation) {
 json container_json(const Container& container) {
   json out = {{"name", container.name}};
   if (const auto* revolved = std::get_if<RevolvedShape>(&container.shape)) {
-    out["revolved"] = {{"profile", revolved->profile},
-                       {"wall_thickness", container.wall_thickness}};
+    out["revolved"] = {{"profile", revolved->profile}, {"wall_thickness", container.wall_thickness}};
   } else {
     const auto& boxes = std::get<BoxShape>(container.shape);
     json solid = json::array();
     for (const auto& box : boxes.solid) solid.push_back(box_json(box));
-    out["boxes"] = {{"cavity", box_json(boxes.cavity)},
-                    {"solid", solid},
-                    {"wall_thickness", container.wall_thickness}};
+    out["boxes"] = {{"cavity", box_json(boxes.cavity)}, {"solid", solid}, {"wall_thickness", container.wall_thickness}};
   }
   out["origin"] = vector_json(container.origin);
   if (container.tilt) out["tilt"] = tilt_json(*container.tilt);
   if (container.translation) out["translation"] = translation_json(*container.translation);
-  if (!container.surface_velocity.isZero(0))
-    out["surface_velocity"] = vector_json(container.surface_velocity);
+  if (!container.surface_velocity.isZero(0)) out["surface_velocity"] = vector_json(container.surface_velocity);
   return out;
 }
 
@@ -85,16 +77,13 @@ json fill_json(const Fill& fill) {
       round["axis"] = std::string(1, "xyz"[fill.round->axis]);
       round["length"] = fill.round->length;
     }
-  } else if (fill.box)
-    out["box"] = box_json(*fill.box);
-  else
-    out["level"] = fill.level;
+  } else if (fill.box) out["box"] = box_json(*fill.box);
+  else out["level"] = fill.level;
   if (!fill.around.empty()) out["around"] = fill.around;
   out["velocity"] = vector_json(fill.velocity);
   if (!fill.velocity_gradient.isZero(0)) {
     json matrix = json::array();
-    for (Eigen::Index a = 0; a < 3; ++a)
-      matrix.push_back(vector_json(fill.velocity_gradient.row(a).transpose()));
+    for (Eigen::Index a = 0; a < 3; ++a) matrix.push_back(vector_json(fill.velocity_gradient.row(a).transpose()));
     out["velocity_gradient"] = {{"matrix", matrix}, {"about", vector_json(fill.gradient_about)}};
   }
   return out;
@@ -118,25 +107,20 @@ std::string scene_to_json(const Scene& scene) {
   json periodic = json::array();
   for (std::size_t a = 0; a < 3; ++a)
     if (scene.domain.periodic[a]) periodic.push_back(std::string(1, "xyz"[a]));
-  out["domain"] = {{"min", vector_json(scene.domain.min)},
-                   {"max", vector_json(scene.domain.max)},
-                   {"periodic", periodic}};
+  out["domain"] = {
+      {"min", vector_json(scene.domain.min)}, {"max", vector_json(scene.domain.max)}, {"periodic", periodic}};
   if (scene.floor) out["floor"] = {{"height", scene.floor->height}};
   out["contact"] = {{"distance_ratio", scene.contact.distance_ratio},
                     {"restitution", scene.contact.restitution},
                     {"friction", scene.contact.friction}};
   out["wall_layers"] = scene.wall_layers;
   out["containers"] = json::array();
-  for (const auto& container : scene.containers)
-    out["containers"].push_back(container_json(container));
+  for (const auto& container : scene.containers) out["containers"].push_back(container_json(container));
   out["fill"] = json::array();
   for (const auto& fill : scene.fills) out["fill"].push_back(fill_json(fill));
   json& time = out["time"];
-  time = {{"end", scene.schedule.end},
-          {"frames", scene.schedule.frames},
-          {"courant", scene.schedule.courant}};
-  if (scene.schedule.substeps_per_frame != 0)
-    time["substeps_per_frame"] = scene.schedule.substeps_per_frame;
+  time = {{"end", scene.schedule.end}, {"frames", scene.schedule.frames}, {"courant", scene.schedule.courant}};
+  if (scene.schedule.substeps_per_frame != 0) time["substeps_per_frame"] = scene.schedule.substeps_per_frame;
   time["substeps_derived"] = scene.schedule.substeps_derived;
   if (scene.schedule.max_speed) time["max_speed"] = *scene.schedule.max_speed;
   return out.dump(2);

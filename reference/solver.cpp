@@ -4,8 +4,7 @@
 
 namespace decant {
 
-bool push_out(const Scene& scene, double distance, const Vec3& normal, const Pose& pose, Vec3& x,
-              Vec3& v) {
+bool push_out(const Scene& scene, double distance, const Vec3& normal, const Pose& pose, Vec3& x, Vec3& v) {
   const double reach = scene.contact_distance();
   if (!(distance < reach)) return false;
   x += (reach - distance) * normal;
@@ -21,8 +20,7 @@ bool push_out(const Scene& scene, double distance, const Vec3& normal, const Pos
   return true;
 }
 
-void collide(const Scene& scene, const std::vector<SolidDistance>& solids, double time,
-             ParticleState& state) {
+void collide(const Scene& scene, const std::vector<SolidDistance>& solids, double time, ParticleState& state) {
   // Containers' order is kept, though no state shows it: they are H >= 1.5 dx apart, and whoever is pushed
   // ends within the contact distance of that surface, dx/2 at most, so that it is dx at least from any other.
   for (std::size_t c = 0; c < solids.size(); ++c) {
@@ -48,12 +46,11 @@ void collide(const Scene& scene, const std::vector<SolidDistance>& solids, doubl
   }
 }
 
-Solver::Solver(const Scene& scene, const Walls& walls, const ParticleState& state,
-               NeighborSearch search)
+Solver::Solver(const Scene& scene, const Walls& walls, const ParticleState& state, NeighborSearch search)
     : Solver(scene, walls, state, boundary_volumes<double>(scene, walls), search) {}
 
-Solver::Solver(const Scene& scene, const Walls& walls, const ParticleState& state,
-               const Eigen::VectorXd& volumes, NeighborSearch search)
+Solver::Solver(const Scene& scene, const Walls& walls, const ParticleState& state, const Eigen::VectorXd& volumes,
+               NeighborSearch search)
     : scene_(scene),
       walls_(walls),
       state_(state),
@@ -65,8 +62,7 @@ void Solver::fields(Fields& out, const StageInputs* given) {
   const PosedWalls posed = pose_walls(scene_, walls_, scene_.time_at(state_.substep));
   find_neighbors(scene_, state_.position, posed.position, search_, neighbors_);
   const bool own_volumes = !given || given->boundary_volume.size() == 0;
-  evaluate<double>(scene_, state_, posed, own_volumes ? volumes_ : given->boundary_volume,
-                   neighbors_, out, given);
+  evaluate<double>(scene_, state_, posed, own_volumes ? volumes_ : given->boundary_volume, neighbors_, out, given);
   out.boundary_volume = volumes_;
 }
 

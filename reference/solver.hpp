@@ -30,7 +30,7 @@ Eigen::VectorXd boundary_volumes(const Scene& scene, const Walls& walls);
 
 /// Wall particles within H of each other in one container, whose frame they stand still in.
 struct WallNeighbors {
-  Eigen::Matrix3Xd position;  // 3×M, m, each in its container's frame
+  Eigen::Matrix3Xd position;                    // 3×M, m, each in its container's frame
   std::vector<std::vector<std::int32_t>> near;  // M lists of b, ascending; self excluded
 };
 WallNeighbors find_wall_neighbors(const Scene& scene, const Walls& walls);
@@ -43,9 +43,8 @@ Eigen::VectorXd boundary_volumes(const Scene& scene, const WallNeighbors& neighb
 /// \param volumes  M, m³; \param given  where it holds density or pressure, these are used for what
 /// follows from them instead of the computed ones, which are returned all the same
 template <class Real>
-void evaluate(const Scene& scene, const ParticleState& state, const PosedWalls& walls,
-              const Eigen::VectorXd& volumes, const Neighbors& neighbors, Fields& out,
-              const StageInputs* given = nullptr);
+void evaluate(const Scene& scene, const ParticleState& state, const PosedWalls& walls, const Eigen::VectorXd& volumes,
+              const Neighbors& neighbors, Fields& out, const StageInputs* given = nullptr);
 
 /// One projection of one particle out to the contact distance phi_c, where the approaching part of
 /// its velocity relative to the wall is taken. Returns false where there is no contact.
@@ -53,13 +52,11 @@ void evaluate(const Scene& scene, const ParticleState& state, const PosedWalls& 
 /// Where phi < phi_c: x += (phi_c − phi) n; w = v − v_wall(x); if w·n < 0, with j = (1 + e)|w·n|:
 /// normal part += j n, tangential part × max(0, 1 − f j/|w_t|).
 /// \param distance  phi, m; \param normal  n, world; \param x  m, \param v  m/s, world, changed
-bool push_out(const Scene& scene, double distance, const Vec3& normal, const Pose& pose, Vec3& x,
-              Vec3& v);
+bool push_out(const Scene& scene, double distance, const Vec3& normal, const Pose& pose, Vec3& x, Vec3& v);
 
 /// Every particle out of the containers (in the scene's order, at most two projections each,
 /// nearest face first) and then off the floor. \param time  s, at which the containers stand
-void collide(const Scene& scene, const std::vector<SolidDistance>& solids, double time,
-             ParticleState& state);
+void collide(const Scene& scene, const std::vector<SolidDistance>& solids, double time, ParticleState& state);
 
 /// A scene under way.
 class Solver {
@@ -67,8 +64,8 @@ class Solver {
   Solver(const Scene& scene, const Walls& walls, const ParticleState& state,
          NeighborSearch search = NeighborSearch::cells);
   /// \param volumes  boundary_volumes of the walls, M, m³
-  Solver(const Scene& scene, const Walls& walls, const ParticleState& state,
-         const Eigen::VectorXd& volumes, NeighborSearch search = NeighborSearch::cells);
+  Solver(const Scene& scene, const Walls& walls, const ParticleState& state, const Eigen::VectorXd& volumes,
+         NeighborSearch search = NeighborSearch::cells);
 
   /// Fields at the present state.
   void fields(Fields& out, const StageInputs* given = nullptr);

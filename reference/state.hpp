@@ -14,7 +14,7 @@ namespace decant {
 using IdVector = Eigen::Matrix<std::int64_t, Eigen::Dynamic, 1>;
 
 struct ParticleState {
-  std::int64_t substep = 0;  // time is scene.time_at(substep)
+  std::int64_t substep = 0;   // time is scene.time_at(substep)
   Eigen::Matrix3Xd position;  // 3×N, m
   Eigen::Matrix3Xd velocity;  // 3×N, m/s
 
@@ -46,12 +46,12 @@ struct Walls {
 
 /// Fields derived from one ParticleState; never clamped in place. Self is not a neighbor here.
 struct Fields {
-  Eigen::VectorXd boundary_volume;  // M, m³
-  Eigen::VectorXd density;          // N, kg/m³
-  Eigen::VectorXd pressure;         // N, Pa
-  Eigen::Matrix3Xd acceleration;    // 3×N, m/s², the sum of the four parts below and gravity
-  Eigen::Matrix3Xd pressure_acceleration;        // fluid on fluid
-  Eigen::Matrix3Xd viscous_acceleration;         // fluid on fluid
+  Eigen::VectorXd boundary_volume;         // M, m³
+  Eigen::VectorXd density;                 // N, kg/m³
+  Eigen::VectorXd pressure;                // N, Pa
+  Eigen::Matrix3Xd acceleration;           // 3×N, m/s², the sum of the four parts below and gravity
+  Eigen::Matrix3Xd pressure_acceleration;  // fluid on fluid
+  Eigen::Matrix3Xd viscous_acceleration;   // fluid on fluid
   Eigen::Matrix3Xd wall_pressure_acceleration;
   Eigen::Matrix3Xd wall_viscous_acceleration;
   IdVector fluid_neighbor_count, fluid_neighbor_id_sum;  // N
@@ -64,11 +64,10 @@ struct Fields {
     f.boundary_volume.setConstant(wall, nan);
     f.density.setConstant(fluid, nan);
     f.pressure.setConstant(fluid, nan);
-    for (auto* a : {&f.acceleration, &f.pressure_acceleration, &f.viscous_acceleration,
-                    &f.wall_pressure_acceleration, &f.wall_viscous_acceleration})
+    for (auto* a : {&f.acceleration, &f.pressure_acceleration, &f.viscous_acceleration, &f.wall_pressure_acceleration,
+                    &f.wall_viscous_acceleration})
       a->setConstant(3, fluid, nan);
-    for (auto* c : {&f.fluid_neighbor_count, &f.fluid_neighbor_id_sum, &f.wall_neighbor_count,
-                    &f.wall_neighbor_id_sum})
+    for (auto* c : {&f.fluid_neighbor_count, &f.fluid_neighbor_id_sum, &f.wall_neighbor_count, &f.wall_neighbor_id_sum})
       c->setConstant(fluid, -1);
     return f;
   }

@@ -25,9 +25,8 @@ double distance_to_line(const Tilt& tilt, const Vec3& line, const Vec3& world) {
 std::vector<Ring> corners(const SolidBox& box) {
   std::vector<Ring> rings;
   for (int k = 0; k < 8; ++k)
-    rings.push_back({{(k & 1 ? box.max : box.min).x(), (k & 2 ? box.max : box.min).y(),
-                      (k & 4 ? box.max : box.min).z()},
-                     0.0});
+    rings.push_back(
+        {{(k & 1 ? box.max : box.min).x(), (k & 2 ? box.max : box.min).y(), (k & 4 ? box.max : box.min).z()}, 0.0});
   return rings;
 }
 
@@ -60,24 +59,22 @@ struct Patch {
   Vec3 half_lengths() const {
     const Vec3 half = 0.5 * (high - low);
     if (!edge) return half;
-    return {half.x() * std::hypot(edge->r1 - edge->r0, edge->z1 - edge->z0),
-            half.y() * std::max(edge->r0, edge->r1), 0.0};
+    return {half.x() * std::hypot(edge->r1 - edge->r0, edge->z1 - edge->z0), half.y() * std::max(edge->r0, edge->r1),
+            0.0};
   }
 };
 
-std::vector<Patch> surface_patches(const std::vector<ProfileEdge>& edges,
-                                   const std::vector<BoxFace>& faces) {
+std::vector<Patch> surface_patches(const std::vector<ProfileEdge>& edges, const std::vector<BoxFace>& faces) {
   std::vector<Patch> patches;
-  for (const auto& e : edges)
-    patches.push_back({&e, Vec3::Zero(), Vec3(1.0, 2 * std::numbers::pi, 0.0)});
+  for (const auto& e : edges) patches.push_back({&e, Vec3::Zero(), Vec3(1.0, 2 * std::numbers::pi, 0.0)});
   for (const auto& f : faces) patches.push_back({nullptr, f.min, f.max});
   return patches;
 }
 
 /// A bound of the way that a point within `radius` of `world` goes, carried with the container, from
 /// the middle of `from` … `to` to any time between them. It can go no farther than round its circle.
-double way_between(const Container& container, const Pose& pose, double from, double to,
-                   const Vec3& world, double radius) {
+double way_between(const Container& container, const Pose& pose, double from, double to, const Vec3& world,
+                   double radius) {
   const double half = 0.5 * (to - from);
   double way = 0;
   if (container.tilt)
@@ -88,8 +85,7 @@ double way_between(const Container& container, const Pose& pose, double from, do
 }
 
 /// Improves `best` with the surface of `a` against the solid of `b`.
-void approach_one_way(const Container& a, const Container& b, double end, double enough,
-                      double slack, Approach& best) {
+void approach_one_way(const Container& a, const Container& b, double end, double enough, double slack, Approach& best) {
   const auto* revolved = std::get_if<RevolvedShape>(&a.shape);
   const auto edges = revolved ? surface_edges(*revolved) : std::vector<ProfileEdge>{};
   const auto faces = revolved ? std::vector<BoxFace>{} : exposed_faces(std::get<BoxShape>(a.shape));
@@ -107,8 +103,7 @@ void approach_one_way(const Container& a, const Container& b, double end, double
   if (times.size() == 1) times = {0.0, 0.0};  // nothing moves
   std::vector<Piece> pieces;
   for (std::size_t k = 0; k + 1 < times.size(); ++k)
-    for (const auto& patch : surface_patches(edges, faces))
-      pieces.push_back({patch, times[k], times[k + 1]});
+    for (const auto& patch : surface_patches(edges, faces)) pieces.push_back({patch, times[k], times[k + 1]});
 
   while (!pieces.empty()) {
     const Piece piece = pieces.back();
@@ -176,20 +171,17 @@ std::vector<Ring> cavity_bottom_rings(const Container& container) {
   return corners(std::get<BoxShape>(container.shape).cavity);
 }
 
-double farthest_along(const Vec3& direction, const std::vector<Ring>& rings,
-                      const Container* container, double end) {
+double farthest_along(const Vec3& direction, const std::vector<Ring>& rings, const Container* container, double end) {
   const auto at_pose = [&](const Pose& pose) {
     const Vec3 local = pose.rotation.transpose() * direction;
     double farthest = -infinity;
     for (const auto& ring : rings)
-      farthest = std::max(farthest, direction.dot(pose.to_world(ring.center)) +
-                                        ring.radius * std::hypot(local.x(), local.y()));
+      farthest = std::max(farthest,
+                          direction.dot(pose.to_world(ring.center)) + ring.radius * std::hypot(local.x(), local.y()));
     return farthest;
   };
   if (!container) return at_pose(Pose{});
-  const double along = container->translation
-                           ? farthest_offset(*container->translation, direction, end)
-                           : 0.0;
+  const double along = container->translation ? farthest_offset(*container->translation, direction, end) : 0.0;
   if (!container->tilt) {
     Container still = *container;
     still.translation.reset();
@@ -200,9 +192,7 @@ double farthest_along(const Vec3& direction, const std::vector<Ring>& rings,
   const int steps = std::max(1, static_cast<int>(std::ceil((range.high - range.low) / 0.01)));
   double farthest = -infinity;
   for (int k = 0; k <= steps; ++k)
-    farthest = std::max(
-        farthest,
-        at_pose(pose_turned(*container, range.low + (range.high - range.low) * k / steps)));
+    farthest = std::max(farthest, at_pose(pose_turned(*container, range.low + (range.high - range.low) * k / steps)));
   return farthest + along;
 }
 
@@ -213,14 +203,12 @@ double fastest_point(const std::vector<Ring>& rings, const Container& container)
   const Pose pose = pose_turned(container, 0.0);
   double farthest = 0;
   for (const auto& ring : rings)
-    farthest = std::max(farthest, distance_to_line(*container.tilt, container.tilt->pivot,
-                                                   pose.to_world(ring.center)) +
-                                      ring.radius);
+    farthest = std::max(
+        farthest, distance_to_line(*container.tilt, container.tilt->pivot, pose.to_world(ring.center)) + ring.radius);
   return speed + greatest_rate(*container.tilt, 0.0, infinity) * farthest;
 }
 
-Approach closest_approach(const Container& a, const Container& b, double end, double enough,
-                          double slack) {
+Approach closest_approach(const Container& a, const Container& b, double end, double enough, double slack) {
   Approach best{infinity, 0.0, Vec3::Zero()};
   approach_one_way(a, b, end, enough, slack, best);
   approach_one_way(b, a, end, enough, slack, best);
@@ -265,8 +253,7 @@ double cavity_bottom(const RevolvedShape& shape) {
 }
 
 bool closed_on_axis(const RevolvedShape& shape) {
-  return std::any_of(shape.profile.begin(), shape.profile.end(),
-                     [](const auto& p) { return p[0] == 0.0; });
+  return std::any_of(shape.profile.begin(), shape.profile.end(), [](const auto& p) { return p[0] == 0.0; });
 }
 
 double rim_height(const RevolvedShape& shape) {

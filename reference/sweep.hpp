@@ -32,8 +32,7 @@ std::vector<Ring> cavity_bottom_rings(const Container& container);
 /// angle whose amplitude is at most its distance from the tilt's line, rho, so the result falls
 /// short of the true one by at most rho · 0.01² / 8 (1 µm at 80 mm). The farthest offset is added to
 /// the farthest turn: a bound where a container does both. \param direction  unit vector, world
-double farthest_along(const Vec3& direction, const std::vector<Ring>& rings,
-                      const Container* container, double end);
+double farthest_along(const Vec3& direction, const std::vector<Ring>& rings, const Container* container, double end);
 
 /// A bound of the rings' speed over the whole motion, m/s, from the steepest slopes of its schedules;
 /// exact where the container only tilts or only translates between keys.
@@ -53,8 +52,7 @@ struct Approach {
 /// a true time; no point of the piece at any of its times is nearer to the other solid by more than
 /// the piece's radius plus the way both containers go. So a gap below `enough` − `slack` cannot
 /// be missed, and none of `enough` or more is refused.
-Approach closest_approach(const Container& a, const Container& b, double end, double enough,
-                          double slack);
+Approach closest_approach(const Container& a, const Container& b, double end, double enough, double slack);
 
 /// Distance from the axis to the nearest solid at height z, m: 0 in the solid, infinite where the
 /// shape has none.

@@ -12,12 +12,10 @@ namespace {
 
 TEST(AddedBackend, IsJudgedLikeTheOthers) {
   using Solver = gpu::host::Pipeline<gpu::host::SlabSearch>;
-  const auto backend = backend_around("slab", Executor::host, "",
-                                      std::make_unique<Solver>(gpu::SolverOptions{}));
+  const auto backend = backend_around("slab", Executor::host, "", std::make_unique<Solver>(gpu::SolverOptions{}));
   EXPECT_EQ(backend->info().name, "slab");
   for (const char* name : {"hostile-crowd", "hostile-periodic", "hostile-cell-faces"}) {
-    const Fixture fixture =
-        read_fixture(std::string(DECANT_SOURCE_DIR "/fixtures/") + name + ".h5");
+    const Fixture fixture = read_fixture(std::string(DECANT_SOURCE_DIR "/fixtures/") + name + ".h5");
     int rows = 0;
     for (const CheckRow& row : judge(*backend, fixture, prepare(fixture))) {
       EXPECT_EQ(judged_verdict(row), Verdict::pass) << name << ": " << row.check << " " << row.field;

@@ -70,10 +70,9 @@ TEST(Audit, FollowsTheSourceAsItTilts) {
     EXPECT_EQ(seen.place[0], static_cast<std::uint8_t>(Place::source)) << substep;
     EXPECT_EQ(seen.crossed, 0) << "it rests while the cup moves";
   }
-  EXPECT_GT((pose_at(scene.containers[0], scene.time_at(last)).to_world(inside) -
-             scene.containers[0].origin - inside)
-                .norm(),
-            0.1);
+  EXPECT_GT(
+      (pose_at(scene.containers[0], scene.time_at(last)).to_world(inside) - scene.containers[0].origin - inside).norm(),
+      0.1);
 }
 
 TEST(Audit, SeesAParticleInAWallAndHowDeep) {

@@ -83,8 +83,8 @@ TEST_P(BackendContract, GivenDensityHasThePressureThatFollows) {
   load(f);
   const Eigen::Index n = f.state.size(), m = sample_walls(f.scene).size();
   StageInputs given;
-  given.density = f.scene.fluid.rest_density *
-                  (1.05 + 0.1 * Eigen::ArrayXd::LinSpaced(n, -1, 1)).cast<float>().cast<double>();
+  given.density =
+      f.scene.fluid.rest_density * (1.05 + 0.1 * Eigen::ArrayXd::LinSpaced(n, -1, 1)).cast<float>().cast<double>();
   given.density = given.density.cast<float>().cast<double>().eval();
   Fields alone = Fields::unwritten(n, m), own = alone, both = alone;
   ASSERT_TRUE(backend_->evaluate(own).ok());
@@ -137,8 +137,7 @@ TEST_P(BackendContract, TwoStretchesAreOneLongOne) {
   if (GetParam().name.starts_with("list")) {
     // Lists are made anew where a stretch begins, which changes the order of sums.
     EXPECT_EQ(state().substep, whole.substep);
-    EXPECT_LE((state().position - whole.position).cwiseAbs().maxCoeff(),
-              1e-5 * f.scene.particle_spacing);
+    EXPECT_LE((state().position - whole.position).cwiseAbs().maxCoeff(), 1e-5 * f.scene.particle_spacing);
   } else {
     expect_equal(state(), whole);
   }
@@ -202,8 +201,8 @@ TEST_P(BackendContract, OneParticleFalls) {
 TEST_P(BackendContract, AWideSceneNeedsNoMoreMemoryAndNoNarrowerOne) {
   // Two particles within reach of each other 900 m from two others, far more cells than any table has.
   const double dx = drops({}).scene.particle_spacing;
-  Fixture f = drops({Vec3(0, 0, 0), Vec3(dx, 0, 0), Vec3(-900, 512, 700),
-                     Vec3(-900, 512, 700 + 0.9 * dx), Vec3(999, -999, -999)});
+  Fixture f = drops(
+      {Vec3(0, 0, 0), Vec3(dx, 0, 0), Vec3(-900, 512, 700), Vec3(-900, 512, 700 + 0.9 * dx), Vec3(999, -999, -999)});
   f.scene.domain = {Vec3(-1000, -1000, -1000), Vec3(1000, 1000, 1000), {}};
   load(f);
   Fields out = Fields::unwritten(5, 0);
@@ -227,8 +226,7 @@ TEST_P(BackendContract, ACrowdThatGathersIsSeenWhole) {
   f.scene.gravity.setZero();
   f.scene.domain = {Vec3::Constant(-5 * H), Vec3::Constant(5 * H), {}};
   f.state.position.resize(3, static_cast<Eigen::Index>(points.size()));
-  for (std::size_t i = 0; i < points.size(); ++i)
-    f.state.position.col(static_cast<Eigen::Index>(i)) = points[i];
+  for (std::size_t i = 0; i < points.size(); ++i) f.state.position.col(static_cast<Eigen::Index>(i)) = points[i];
   const double dt = f.scene.time_step();
   f.state.velocity = -0.7 / (200 * dt) * f.state.position;
   f.state.quantise();
@@ -294,9 +292,7 @@ TEST_P(BackendContract, AParticleThatLeavesTheDomainIsReportedWhenItDoes) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Backends, BackendContract, testing::ValuesIn(choices()),
-                         [](const auto& chosen) {
-                           return test::plain_name(chosen.param.name, chosen.param.executor);
-                         });
+                         [](const auto& chosen) { return test::plain_name(chosen.param.name, chosen.param.executor); });
 
 }  // namespace
 }  // namespace decant

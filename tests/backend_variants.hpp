@@ -33,15 +33,13 @@ inline std::vector<std::string> backend_variants() {
 
 inline std::unique_ptr<Backend> make_variant(const std::string& variant, Executor executor) {
   const auto colon = variant.find(':');
-  return make_backend(variant.substr(0, colon), executor,
-                      colon == std::string::npos ? "" : variant.substr(colon + 1));
+  return make_backend(variant.substr(0, colon), executor, colon == std::string::npos ? "" : variant.substr(colon + 1));
 }
 
 /// Letters and digits alone, for the name of a test.
 inline std::string plain_name(const std::string& variant, Executor executor) {
   std::string name;
-  for (const char c : variant)
-    name += std::isalnum(static_cast<unsigned char>(c)) ? c : '_';
+  for (const char c : variant) name += std::isalnum(static_cast<unsigned char>(c)) ? c : '_';
   return name + (executor == Executor::host ? "Host" : "Cuda");
 }
 

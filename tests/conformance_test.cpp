@@ -9,16 +9,16 @@
 #include "gpu/backends.hpp"
 #include "oracle/reference_backend.hpp"
 #include "reference/distance.hpp"
-#include "reference/pose.hpp"
 #include "reference/error.hpp"
+#include "reference/pose.hpp"
 #include "tools/fixture_folder.hpp"
 
 #include <gtest/gtest.h>
 
+#include <rapidcheck/gtest.h>
 #include <random>
 #include <string>
 #include <vector>
-#include <rapidcheck/gtest.h>
 
 namespace decant {
 namespace {
@@ -41,8 +41,7 @@ std::string objections(Backend& backend, const Fixture& fixture) {
 
 /// A fixture of the state with the oracle's answer, as `record` makes it.
 Fixture answered(Fixture fixture) {
-  evaluate_oracle(fixture.scene, fixture.state, fixture.fields.emplace(),
-                  fixture.condition.emplace());
+  evaluate_oracle(fixture.scene, fixture.state, fixture.fields.emplace(), fixture.condition.emplace());
   return fixture;
 }
 
@@ -71,9 +70,7 @@ TEST(Fixtures, AreJudgedTheSameByAllPairsAsByCells) {
 
 class Conformance : public testing::TestWithParam<std::tuple<std::string, Executor>> {
  protected:
-  std::unique_ptr<Backend> backend() {
-    return test::make_variant(std::get<0>(GetParam()), std::get<1>(GetParam()));
-  }
+  std::unique_ptr<Backend> backend() { return test::make_variant(std::get<0>(GetParam()), std::get<1>(GetParam())); }
   void SetUp() override {
     std::string why_not;
     if (!executor_available(std::get<1>(GetParam()), &why_not)) GTEST_SKIP() << why_not;
@@ -143,8 +140,7 @@ Fixture around_walls(const char* recording, std::uint32_t seed) {
     }
   }
   f.state.position.resize(3, static_cast<Eigen::Index>(kept.size()));
-  for (std::size_t i = 0; i < kept.size(); ++i)
-    f.state.position.col(static_cast<Eigen::Index>(i)) = kept[i];
+  for (std::size_t i = 0; i < kept.size(); ++i) f.state.position.col(static_cast<Eigen::Index>(i)) = kept[i];
   f.state.velocity.setZero(3, f.state.position.cols());
   f.state.quantise();
   return f;
@@ -157,8 +153,7 @@ TEST_P(Conformance, HoldsAllAroundTheWalls) {
 }
 
 /// What a list that verifies itself counts in some substeps. The status tells of promises not kept.
-PairTotals counted(const std::string& variant, const Fixture& fixture, int substeps,
-                   Status* status = nullptr) {
+PairTotals counted(const std::string& variant, const Fixture& fixture, int substeps, Status* status = nullptr) {
   const auto list = test::make_variant(variant + ":check_completeness=on", Executor::host);
   list->load(fixture.scene, sample_walls(fixture.scene), fixture.state);
   const Status seen = list->advance(substeps);
@@ -169,8 +164,8 @@ PairTotals counted(const std::string& variant, const Fixture& fixture, int subst
 TEST(Lists, MissNothingWhileTheyAreWatchedAndMuchWhileTheyAreNot) {
   constexpr int substeps = 40;
   const Fixture fixture = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-splash.h5");
-  for (const char* watched : {"list", "list:criterion=relative:skin=0.05",
-                              "list:build=all-pairs:skin=0.1", "list:skin=0.4"}) {
+  for (const char* watched :
+       {"list", "list:criterion=relative:skin=0.05", "list:build=all-pairs:skin=0.1", "list:skin=0.4"}) {
     Status status;
     const PairTotals all = counted(watched, fixture, substeps, &status);
     EXPECT_TRUE(status.ok()) << watched << ": " << describe(status);
@@ -215,8 +210,7 @@ TEST(Lists, MissNothingInRandomScenes) {
   for (std::uint32_t seed = 1; seed <= 60; ++seed) {
     const Fixture f = test::random_fixture(seed);
     Status status;
-    const PairTotals all =
-        counted(seed % 2 ? "list" : "list:criterion=relative:skin=0.1", f, 12, &status);
+    const PairTotals all = counted(seed % 2 ? "list" : "list:criterion=relative:skin=0.1", f, 12, &status);
     EXPECT_EQ(status.bits & Status::missed_pair, 0u) << seed << ": " << describe(status);
     EXPECT_EQ(all.missed + all.wall_missed, 0) << seed;
   }
@@ -226,8 +220,7 @@ INSTANTIATE_TEST_SUITE_P(Backends, Conformance,
                          testing::Combine(testing::ValuesIn(test::backend_variants()),
                                           testing::Values(Executor::host, Executor::cuda)),
                          [](const auto& chosen) {
-                           return test::plain_name(std::get<0>(chosen.param),
-                                                   std::get<1>(chosen.param));
+                           return test::plain_name(std::get<0>(chosen.param), std::get<1>(chosen.param));
                          });
 
 }  // namespace

@@ -20,9 +20,9 @@ using Mat3f = Eigen::Matrix3f;
 
 /// Ways to compute the same.
 struct Form {
-  bool about_pivot;        // local place as Rᵀ(x − pivot) + …, not as Rᵀ(x − t)
-  bool lever_from_local;   // the wall's velocity from the place in the container
-  bool normal_of_the_way;  // beside a face too the normal is the way from the nearest point
+  bool about_pivot;                     // local place as Rᵀ(x − pivot) + …, not as Rᵀ(x − t)
+  bool lever_from_local;                // the wall's velocity from the place in the container
+  bool normal_of_the_way;               // beside a face too the normal is the way from the nearest point
   float friction = 1, restitution = 1;  // factors; what is right has 1
   bool wall_before_push = false;        // wrong
 };
@@ -41,14 +41,14 @@ class FloatContact {
         omega_(pose.angular_velocity.cast<float>()),
         arm_((pose.rotation.transpose() * (pose.pivot - pose.translation)).cast<float>()) {
     for (const auto& e : surface_edges(std::get<RevolvedShape>(scene.containers[0].shape)))
-      edges_.push_back({static_cast<float>(e.r0), static_cast<float>(e.z0), static_cast<float>(e.r1),
-                        static_cast<float>(e.z1)});
+      edges_.push_back(
+          {static_cast<float>(e.r0), static_cast<float>(e.z0), static_cast<float>(e.r1), static_cast<float>(e.z1)});
   }
 
   void operator()(Vec3f& x, Vec3f& v) const {
     for (int projection = 0; projection < 2; ++projection) {
-      const Vec3f local = form_.about_pivot ? Vec3f(R_.transpose() * (x - pivot_) + arm_)
-                                            : Vec3f(R_.transpose() * (x - t_));
+      const Vec3f local =
+          form_.about_pivot ? Vec3f(R_.transpose() * (x - pivot_) + arm_) : Vec3f(R_.transpose() * (x - t_));
       Vec3f normal;
       const float distance = signed_distance(local, normal);
       if (!(distance < reach_)) return;
@@ -91,9 +91,7 @@ class FloatContact {
     const Vec3f before = x;
     x += (reach_ - distance) * normal;
     const Vec3f& at = form_.wall_before_push ? before : x;
-    const Vec3f lever = form_.lever_from_local
-                            ? Vec3f(R_ * (R_.transpose() * (at - t_) - arm_))
-                            : Vec3f(at - pivot_);
+    const Vec3f lever = form_.lever_from_local ? Vec3f(R_ * (R_.transpose() * (at - t_) - arm_)) : Vec3f(at - pivot_);
     const Vec3f wall = omega_.cross(lever), w = v - wall;
     const float approach = w.dot(normal);
     if (!(approach < 0)) return;
@@ -142,10 +140,10 @@ Scores scores(const Scene& scene, const Form& form, int cases) {
     const double r = real(0.012, 0.031), angle = real(0, 6.28);
     const Vec3 local(r * std::cos(angle), r * std::sin(angle), real(-0.01, 0.032));
     const Vec3f x0 = poses[0].to_world(local).cast<float>(),
-                v0 = (poses[0].velocity_at(x0.cast<double>())).cast<float>() +
-                     Vec3f(static_cast<float>(real(-1, 1)), static_cast<float>(real(-1, 1)),
-                           static_cast<float>(real(-1, 1))) *
-                         (k % 2 ? 1.0f : 0.01f);
+                v0 = (poses[0].velocity_at(x0.cast<double>())).cast<float>() + Vec3f(static_cast<float>(real(-1, 1)),
+                                                                                     static_cast<float>(real(-1, 1)),
+                                                                                     static_cast<float>(real(-1, 1))) *
+                                                                                   (k % 2 ? 1.0f : 0.01f);
     Vec3f x = x0, v = v0;
     port(x, v);
     double least = std::numeric_limits<double>::infinity();
@@ -162,8 +160,7 @@ Scores scores(const Scene& scene, const Form& form, int cases) {
           double worst = 0;
           const auto apart = [&](const Vec3& got, const Vec3& expected, const Vec3& tolerance) {
             for (int c = 0; c < 3; ++c)
-              if (got[c] != expected[c])
-                worst = std::max(worst, std::abs(got[c] - expected[c]) / tolerance[c]);
+              if (got[c] != expected[c]) worst = std::max(worst, std::abs(got[c] - expected[c]) / tolerance[c]);
           };
           apart(x.cast<double>(), p.x, p.tau_x);
           apart(v.cast<double>(), p.v, p.tau_v);

@@ -14,9 +14,7 @@
 namespace decant {
 namespace {
 
-std::vector<SolidDistance> solids_of(const Scene& scene) {
-  return {scene.containers.begin(), scene.containers.end()};
-}
+std::vector<SolidDistance> solids_of(const Scene& scene) { return {scene.containers.begin(), scene.containers.end()}; }
 
 /// The state after contact with the containers from the first on, and from the last.
 std::array<ParticleState, 2> both_orders(Scene scene, const ParticleState& state) {

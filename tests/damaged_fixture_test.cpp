@@ -71,8 +71,7 @@ TEST_F(DamagedFixture, DamageAnywhereInTheFileNeverCrashes) {
 TEST_F(DamagedFixture, AChunkThatInflatesToLessThanItIsIsRefused) {
   edit([](hid_t file) {
     const hid_t data = H5Dopen2(file, "/oracle/density", H5P_DEFAULT);
-    const unsigned char eight_zeros[] = {0x78, 0x9c, 0x63, 0x60, 0x80, 0x01, 0x00, 0x00, 0x08,
-                                         0x00, 0x01};
+    const unsigned char eight_zeros[] = {0x78, 0x9c, 0x63, 0x60, 0x80, 0x01, 0x00, 0x00, 0x08, 0x00, 0x01};
     const hsize_t start = 0;
     H5Dwrite_chunk(data, H5P_DEFAULT, 0, &start, sizeof eight_zeros, eight_zeros);
     H5Dclose(data);
@@ -103,13 +102,12 @@ TEST_F(DamagedFixture, AMissingPhaseIsRefused) {
 }
 
 TEST_F(DamagedFixture, EachMissingGroupIsNamed) {
-  const std::vector<std::pair<std::string, std::string>> groups = {
-      {"/scene", "/scene"},
-      {"/state", "/state/position"},
-      {"/walls", "/walls"},
-      {"/oracle", "/oracle/boundary_volume"},
-      {"/condition", "/condition/density"},
-      {"/provenance", "/provenance"}};
+  const std::vector<std::pair<std::string, std::string>> groups = {{"/scene", "/scene"},
+                                                                   {"/state", "/state/position"},
+                                                                   {"/walls", "/walls"},
+                                                                   {"/oracle", "/oracle/boundary_volume"},
+                                                                   {"/condition", "/condition/density"},
+                                                                   {"/provenance", "/provenance"}};
   const std::string good = bytes();
   for (const auto& [group, key] : groups) {
     replace_bytes(good);
@@ -120,9 +118,9 @@ TEST_F(DamagedFixture, EachMissingGroupIsNamed) {
 
 TEST_F(DamagedFixture, EachMissingDatasetIsNamed) {
   const std::string good = bytes();
-  for (const std::string path : {"/state/velocity", "/oracle/density", "/oracle/acceleration",
-                                 "/oracle/wall_neighbor_id_sum", "/condition/density_pose",
-                                 "/condition/wall_viscous_acceleration"}) {
+  for (const std::string path :
+       {"/state/velocity", "/oracle/density", "/oracle/acceleration", "/oracle/wall_neighbor_id_sum",
+        "/condition/density_pose", "/condition/wall_viscous_acceleration"}) {
     replace_bytes(good);
     remove(path);
     expect_refused(path, "missing", "required");
@@ -167,9 +165,7 @@ TEST_F(DamagedFixture, WrongClassesAreRefused) {
 
 TEST_F(DamagedFixture, AGroupInADatasetsPlaceIsRefused) {
   remove("/oracle/density");
-  edit([](hid_t file) {
-    H5Gclose(H5Gcreate2(file, "/oracle/density", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
-  });
+  edit([](hid_t file) { H5Gclose(H5Gcreate2(file, "/oracle/density", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT)); });
   expect_refused("/oracle/density", "a group", "a dataset");
 }
 
@@ -181,9 +177,8 @@ TEST_F(DamagedFixture, AbsurdExtentsAreRefusedWithoutAskingForTheMemory) {
 TEST_F(DamagedFixture, ValuesThatAreNotFiniteAreRefused) {
   const std::string good = bytes();
   for (const std::string path :
-       {"/state/position", "/state/velocity", "/oracle/density", "/oracle/pressure",
-        "/oracle/acceleration", "/oracle/boundary_volume", "/condition/density",
-        "/condition/viscous_acceleration"})
+       {"/state/position", "/state/velocity", "/oracle/density", "/oracle/pressure", "/oracle/acceleration",
+        "/oracle/boundary_volume", "/condition/density", "/condition/viscous_acceleration"})
     for (const double value : {nan, infinite, -infinite}) {
       replace_bytes(good);
       spoil(path, value);
@@ -202,11 +197,10 @@ TEST_F(DamagedFixture, AStateThatIsNotSinglePrecisionIsRefused) {
 
 TEST_F(DamagedFixture, ValuesOutOfRangeAreRefused) {
   const std::string good = bytes();
-  const std::vector<std::tuple<std::string, double, std::string>> cases = {
-      {"/oracle/density", 0, "> 0"},
-      {"/oracle/boundary_volume", -1, "> 0"},
-      {"/oracle/wall_neighbor_count", -1, ">= 0"},
-      {"/condition/density_pose", -1, ">= 0"}};
+  const std::vector<std::tuple<std::string, double, std::string>> cases = {{"/oracle/density", 0, "> 0"},
+                                                                           {"/oracle/boundary_volume", -1, "> 0"},
+                                                                           {"/oracle/wall_neighbor_count", -1, ">= 0"},
+                                                                           {"/condition/density_pose", -1, ">= 0"}};
   for (const auto& [path, value, bound] : cases) {
     replace_bytes(good);
     spoil(path, value);

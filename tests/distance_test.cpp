@@ -24,19 +24,16 @@ Container cup() { return container(cup_shape(0.05, 0.1, 0.02)); }
 
 /// Walls that lean outward and end in a ridge.
 Container funnel_cup() {
-  return container(RevolvedShape{
-      {{0, -0.02}, {0.04, -0.02}, {0.09, 0.08}, {0.08, 0.1}, {0.05, 0.03}, {0.03, 0}, {0, 0.01}}});
+  return container(
+      RevolvedShape{{{0, -0.02}, {0.04, -0.02}, {0.09, 0.08}, {0.08, 0.1}, {0.05, 0.03}, {0.03, 0}, {0, 0.01}}});
 }
 
 /// Cavity 20 × 10 × 30 cm, walls 2 cm, open above.
-Container tank() {
-  return container(tank_shape(Vec3(0.2, 0.1, 0.3), 0.02, {{{}, {}, {false, true}}}));
-}
+Container tank() { return container(tank_shape(Vec3(0.2, 0.1, 0.3), 0.02, {{{}, {}, {false, true}}})); }
 
 /// A slab below the plane z = 0 without end in x and y.
 Container endless_floor() {
-  BoxShape slab =
-      tank_shape(Vec3(0.2, 0.1, 0.3), 0.02, {{{true, true}, {true, true}, {false, true}}});
+  BoxShape slab = tank_shape(Vec3(0.2, 0.1, 0.3), 0.02, {{{true, true}, {true, true}, {false, true}}});
   slab.endless = {true, true, false};
   return container(slab);
 }
@@ -51,8 +48,7 @@ void expect(const Container& solid, const std::vector<Case>& cases) {
   for (const Case& c : cases) {
     const SurfaceDistance found = signed_distance(solid, c.point);
     EXPECT_NEAR(found.distance, c.distance, 1e-15) << c.point.transpose();
-    EXPECT_LT((found.normal - c.normal).norm(), 1e-12)
-        << c.point.transpose() << ": " << found.normal.transpose();
+    EXPECT_LT((found.normal - c.normal).norm(), 1e-12) << c.point.transpose() << ": " << found.normal.transpose();
   }
 }
 
@@ -92,20 +88,19 @@ TEST(CupDistance, TakesTheMeridianOfXOnTheAxis) {
 }
 
 TEST(TankDistance, IsAsMeasuredByHand) {
-  expect(tank(),
-         {{{0.1, 0.05, 0.01}, 0.01, {0, 0, 1}},       // above the bottom
-          {{0.004, 0.05, 0.2}, 0.004, {1, 0, 0}},     // beside the low x wall
-          {{0.1, 0.097, 0.2}, 0.003, {0, -1, 0}},     // beside the high y wall
-          {{0.002, 0.003, 0.004}, 0.002, {1, 0, 0}},  // in the corner
-          {{0.1, 0.05, -0.005}, -0.005, {0, 0, 1}},   // inside the bottom
-          {{-0.006, 0.05, 0.1}, -0.006, {1, 0, 0}},   // inside a wall, inner half
-          {{-0.018, 0.05, 0.1}, -0.002, {-1, 0, 0}},  // inside a wall, outer half
-          {{-0.002, -0.003, -0.006}, -0.007, {2 / 7., 3 / 7., 6 / 7.}},  // in the corner's solid
-          {{-0.01, 0.05, 0.34}, 0.04, {0, 0, 1}},                        // above the rim
-          {{0.1, 0.05, 0.42}, 0.13, {0, 5. / 13, 12. / 13}},  // above the mouth, low y first
-          {{0.1, 0.05, -0.05}, 0.03, {0, 0, -1}},             // beneath
-          {{0.22 + 0.002, 0.12 + 0.003, -0.026}, 0.007, {2 / 7., 3 / 7., -6 / 7.}},  // outside
-          {{0, 0.05, 0.1}, 0, {1, 0, 0}}});                                          // on a wall
+  expect(tank(), {{{0.1, 0.05, 0.01}, 0.01, {0, 0, 1}},                          // above the bottom
+                  {{0.004, 0.05, 0.2}, 0.004, {1, 0, 0}},                        // beside the low x wall
+                  {{0.1, 0.097, 0.2}, 0.003, {0, -1, 0}},                        // beside the high y wall
+                  {{0.002, 0.003, 0.004}, 0.002, {1, 0, 0}},                     // in the corner
+                  {{0.1, 0.05, -0.005}, -0.005, {0, 0, 1}},                      // inside the bottom
+                  {{-0.006, 0.05, 0.1}, -0.006, {1, 0, 0}},                      // inside a wall, inner half
+                  {{-0.018, 0.05, 0.1}, -0.002, {-1, 0, 0}},                     // inside a wall, outer half
+                  {{-0.002, -0.003, -0.006}, -0.007, {2 / 7., 3 / 7., 6 / 7.}},  // in the corner's solid
+                  {{-0.01, 0.05, 0.34}, 0.04, {0, 0, 1}},                        // above the rim
+                  {{0.1, 0.05, 0.42}, 0.13, {0, 5. / 13, 12. / 13}},             // above the mouth, low y first
+                  {{0.1, 0.05, -0.05}, 0.03, {0, 0, -1}},                        // beneath
+                  {{0.22 + 0.002, 0.12 + 0.003, -0.026}, 0.007, {2 / 7., 3 / 7., -6 / 7.}},  // outside
+                  {{0, 0.05, 0.1}, 0, {1, 0, 0}}});                                          // on a wall
 }
 
 TEST(EndlessFloor, HasNoSurfaceWhereThePeriodCutsIt) {
@@ -121,8 +116,7 @@ bool inside(const RevolvedShape& shape, const Vec3& x) {
   double turned = 0;
   for (std::size_t k = 0; k < shape.profile.size(); ++k) {
     const auto &from = shape.profile[k], &to = shape.profile[(k + 1) % shape.profile.size()];
-    const Eigen::Vector2d a = Eigen::Vector2d(from[0], from[1]) - p,
-                          b = Eigen::Vector2d(to[0], to[1]) - p;
+    const Eigen::Vector2d a = Eigen::Vector2d(from[0], from[1]) - p, b = Eigen::Vector2d(to[0], to[1]) - p;
     turned += std::atan2(a.x() * b.y() - a.y() * b.x(), a.dot(b));
   }
   return turned > pi;
@@ -130,8 +124,7 @@ bool inside(const RevolvedShape& shape, const Vec3& x) {
 
 bool inside(const BoxShape& shape, const Vec3& x) {
   bool found = false;
-  for (const auto& b : shape.solid)
-    found = found || ((x - b.min).minCoeff() >= 0 && (b.max - x).minCoeff() >= 0);
+  for (const auto& b : shape.solid) found = found || ((x - b.min).minCoeff() >= 0 && (b.max - x).minCoeff() >= 0);
   return found;
 }
 
@@ -150,8 +143,7 @@ std::vector<Vec3> surface_points(const RevolvedShape& shape, double gap) {
       const double r = a[0] + (b[0] - a[0]) * s / steps, z = a[1] + (b[1] - a[1]) * s / steps;
       const int around = static_cast<int>(2 * pi * r / gap) + 1;
       for (int n = 0; n < around; ++n)
-        points.emplace_back(r * std::cos(2 * pi * n / around), r * std::sin(2 * pi * n / around),
-                            z);
+        points.emplace_back(r * std::cos(2 * pi * n / around), r * std::sin(2 * pi * n / around), z);
     }
   }
   return points;
@@ -165,8 +157,7 @@ std::vector<Vec3> surface_points(const BoxShape& shape, double gap) {
       for (const double plane : {box.min[a], box.max[a]}) {
         const int u = (a + 1) % 3, v = (a + 2) % 3;
         const Vec3 size = box.max - box.min;
-        const int nu = static_cast<int>(size[u] / gap) + 1,
-                  nv = static_cast<int>(size[v] / gap) + 1;
+        const int nu = static_cast<int>(size[u] / gap) + 1, nv = static_cast<int>(size[v] / gap) + 1;
         for (int i = 0; i < nu; ++i)
           for (int j = 0; j < nv; ++j) {
             Vec3 x = box.min;
@@ -191,8 +182,7 @@ INSTANTIATE_TEST_SUITE_P(All, EverySolid, testing::Values("Cup", "FunnelCup", "T
 
 TEST_P(EverySolid, IsAsFarAsTheNearestOfDenseSurfacePoints) {
   const double gap = 0.002;
-  const auto surface =
-      std::visit([&](const auto& shape) { return surface_points(shape, gap); }, solid_.shape);
+  const auto surface = std::visit([&](const auto& shape) { return surface_points(shape, gap); }, solid_.shape);
   const Eigen::Matrix3Xd points = cloud(3, 300, -0.1, 0.25);
   for (const auto& x : points.colwise()) {
     double nearest = std::numeric_limits<double>::infinity();
@@ -220,8 +210,7 @@ TEST_P(EverySolid, HasAUnitNormalAlongTheWayFromItsNearestSurfacePoint) {
     const auto [distance, normal] = solid.at(x);
     EXPECT_NEAR(normal.norm(), 1, 1e-12) << x.transpose();
     EXPECT_NEAR(solid.at(x - distance * normal).distance, 0, 1e-14) << x.transpose();
-    EXPECT_NEAR(solid.at(x - 0.4 * distance * normal).distance, 0.6 * distance, 1e-14)
-        << x.transpose();
+    EXPECT_NEAR(solid.at(x - 0.4 * distance * normal).distance, 0.6 * distance, 1e-14) << x.transpose();
   }
 }
 
@@ -241,13 +230,13 @@ TEST_P(EverySolid, IsNeverNearerThanItsBoundingBoxAllows) {
 TEST(Cavity, IsTheRoomForFluidAndNothingElse) {
   for (const Vec3& x : {Vec3(0, 0, 0.01), Vec3(0.049, 0, 0.099), Vec3(-0.03, 0.03, 0.05)})
     EXPECT_TRUE(in_cavity(cup(), x)) << x.transpose();
-  for (const Vec3& x : {Vec3(0, 0, 0.11), Vec3(0.06, 0, 0.05), Vec3(0, 0, -0.01), Vec3(0, 0, -0.05),
-                        Vec3(0.1, 0, 0.05), Vec3(0.06, 0, 0.12)})
+  for (const Vec3& x : {Vec3(0, 0, 0.11), Vec3(0.06, 0, 0.05), Vec3(0, 0, -0.01), Vec3(0, 0, -0.05), Vec3(0.1, 0, 0.05),
+                        Vec3(0.06, 0, 0.12)})
     EXPECT_FALSE(in_cavity(cup(), x)) << x.transpose();
   for (const Vec3& x : {Vec3(0.1, 0.05, 0.01), Vec3(0.001, 0.099, 0.299)})
     EXPECT_TRUE(in_cavity(tank(), x)) << x.transpose();
-  for (const Vec3& x : {Vec3(0.1, 0.05, 0.31), Vec3(-0.01, 0.05, 0.1), Vec3(0.1, 0.05, -0.01),
-                        Vec3(0.1, 0.05, -0.05), Vec3(0.3, 0.05, 0.1)})
+  for (const Vec3& x : {Vec3(0.1, 0.05, 0.31), Vec3(-0.01, 0.05, 0.1), Vec3(0.1, 0.05, -0.01), Vec3(0.1, 0.05, -0.05),
+                        Vec3(0.3, 0.05, 0.1)})
     EXPECT_FALSE(in_cavity(tank(), x)) << x.transpose();
 }
 

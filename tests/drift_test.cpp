@@ -30,14 +30,12 @@ const Fixture& splash() {
   return fixture;
 }
 
-DriftPlan plan_of(const std::vector<int>& intervals, const std::vector<double>& skins, int window,
-                  bool timed) {
+DriftPlan plan_of(const std::vector<int>& intervals, const std::vector<double>& skins, int window, bool timed) {
   return {all_lists(intervals, skins), window, timed};
 }
 
 const DriftResult& measured() {
-  static const DriftResult result =
-      measure_drift(splash(), plan_of({1, 4, 12}, {0, 0.4}, 12, true), list_on_host);
+  static const DriftResult result = measure_drift(splash(), plan_of({1, 4, 12}, {0, 0.4}, 12, true), list_on_host);
   return result;
 }
 
@@ -66,8 +64,7 @@ TEST(Drift, GrowsWithTheIntervalAndShrinksWithTheSkin) {
 }
 
 TEST(Drift, NothingIsMissedBeforeDisplacementsAllowIt) {
-  for (const DriftRow& r : measured().rows)
-    EXPECT_LE(r.proved_until, r.first_miss) << r.list.interval;
+  for (const DriftRow& r : measured().rows) EXPECT_LE(r.proved_until, r.first_miss) << r.list.interval;
   for (const SafeInterval& safe : measured().safe) {
     EXPECT_GE(safe.measured, 1);
     EXPECT_LE(safe.proved, safe.measured);
@@ -108,8 +105,7 @@ TEST(Drift, TheSkinThatTheoryAsksForKeepsTheTolerance) {
       // Theory knows the window's first state only.
       EXPECT_LT(result.rows[0].acceleration_rms, 2 * tolerance) << phase << " " << tolerance;
       // Nor does it ask for much more than is needed.
-      EXPECT_GT(result.rows[1].acceleration_rms, skin > 0 ? tolerance / 4 : 0)
-          << phase << " " << tolerance;
+      EXPECT_GT(result.rows[1].acceleration_rms, skin > 0 ? tolerance / 4 : 0) << phase << " " << tolerance;
     }
   }
 }
@@ -147,11 +143,9 @@ TEST(Drift, HoldsOnStatesThatTheRecommendationHasNotSeen) {
   constexpr double tolerance = 1e-2;
   std::vector<DriftResult> seen;
   for (const char* phase : {"splash", "filling"}) {
-    seen.push_back(
-        measure_drift(recorded(phase), plan_of({1, 5, 10}, {0, 0.1, 0.2}, 12, false), list_on_host));
+    seen.push_back(measure_drift(recorded(phase), plan_of({1, 5, 10}, {0, 0.1, 0.2}, 12, false), list_on_host));
     // Times as they are on a GPU: a rebuild costs as much as two substeps.
-    for (DriftRow& r : seen.back().rows)
-      r.substep_us = 10 + 20.0 / r.list.interval + 20 * r.list.skin;
+    for (DriftRow& r : seen.back().rows) r.substep_us = 10 + 20.0 / r.list.interval + 20 * r.list.skin;
     DriftRow adaptive;
     adaptive.list = {0, not_measured, false};
     adaptive.substep_us = 25;
@@ -161,8 +155,7 @@ TEST(Drift, HoldsOnStatesThatTheRecommendationHasNotSeen) {
   ASSERT_NE(best, nullptr);
   EXPECT_GT(best->list.interval, 1);
   for (const char* phase : {"tilt-onset", "stream", "dense-walls-stream", "rest"}) {
-    const DriftResult unseen =
-        measure_drift(recorded(phase), {{best->list}, 20, false}, list_on_host);
+    const DriftResult unseen = measure_drift(recorded(phase), {{best->list}, 20, false}, list_on_host);
     EXPECT_LE(unseen.rows[0].acceleration_rms, tolerance) << phase;
   }
 }
@@ -265,9 +258,7 @@ class Series : public testing::Test {
     write_kind(group + "/fluid", near.fluid);
     write_kind(group + "/wall", near.wall);
   }
-  void number(const std::string& path, std::int64_t value) {
-    out_->integers(path, IdVector::Constant(1, value));
-  }
+  void number(const std::string& path, std::int64_t value) { out_->integers(path, IdVector::Constant(1, value)); }
   void write_kind(const std::string& path, const std::vector<std::vector<std::int32_t>>& lists) {
     IdVector count(static_cast<Eigen::Index>(lists.size()));
     std::vector<std::int64_t> all;
@@ -310,8 +301,7 @@ TEST_F(Series, IsLookedAtAsOurOwnListsAre) {
   for (const std::size_t built : {0u, 2u}) {
     const StaleList own(fixture_.scene, volumes_.volume, instants_[built], 0);
     for (const std::size_t age : {0u, 1u}) {
-      const Staleness expected = own.at(instants_[built + age]),
-                      got = result.samples[built + age].stale;
+      const Staleness expected = own.at(instants_[built + age]), got = result.samples[built + age].stale;
       EXPECT_EQ(got.age, static_cast<std::int64_t>(age));
       EXPECT_EQ(got.fluid.missed, expected.fluid.missed);
       EXPECT_EQ(got.wall.missed, expected.wall.missed);
@@ -338,8 +328,7 @@ TEST_F(Series, ThatHasEachPairOnceIsRecognised) {
   ASSERT_GT(pairs, 10u);
   write_list(0, 0, half);
   const std::string said = complaint();
-  EXPECT_NE(said.find("/list/0/fluid = " + std::to_string(pairs) + " pairs"), std::string::npos)
-      << said;
+  EXPECT_NE(said.find("/list/0/fluid = " + std::to_string(pairs) + " pairs"), std::string::npos) << said;
   EXPECT_NE(said.find("half list"), std::string::npos) << said;
 }
 

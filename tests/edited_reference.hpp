@@ -13,8 +13,8 @@ namespace decant::test {
 
 struct Edit {
   std::function<void(Scene&, ParticleState&)> loaded = [](Scene&, ParticleState&) {};
-  std::function<void(const Scene&, Neighbors&, Eigen::VectorXd& volumes)> found =
-      [](const Scene&, Neighbors&, Eigen::VectorXd&) {};
+  std::function<void(const Scene&, Neighbors&, Eigen::VectorXd& volumes)> found = [](const Scene&, Neighbors&,
+                                                                                     Eigen::VectorXd&) {};
   std::function<void(const Scene&, Fields&)> evaluated = [](const Scene&, Fields&) {};
   std::function<void(ParticleState&)> advanced = [](ParticleState&) {};
 };

@@ -21,25 +21,21 @@ struct Case {
 
 /// \param size  edge of the cloud over H; \param per_wall  particles of each container; \param
 /// tilts  the first one
-Case random_case(KernelFamily family, int seed, int particles, double size, int per_wall,
-                 bool tilts = true) {
+Case random_case(KernelFamily family, int seed, int particles, double size, int per_wall, bool tilts = true) {
   Case c;
   c.scene = open_scene(family);
   c.scene.gravity = Vec3(0.3, -0.2, -9.81);
   const double edge = size * c.scene.support_radius();
   const Tilt tilt{Vec3(0.1, 0, 0.2), Vec3::UnitY(), {{0, 0}, {1, 1.5}}};
-  c.scene.containers = {{"tilting", {}, Vec3::Zero(), 0.04, tilt},
-                        {"fixed", {}, Vec3(0, 0, -0.2), 0.04, {}}};
+  c.scene.containers = {{"tilting", {}, Vec3::Zero(), 0.04, tilt}, {"fixed", {}, Vec3(0, 0, -0.2), 0.04, {}}};
   if (!tilts) c.scene.containers[0].tilt.reset();
-  c.state =
-      state_of(cloud(seed, particles, -edge / 2, edge / 2), cloud(seed + 1, particles, -2, 2));
+  c.state = state_of(cloud(seed, particles, -edge / 2, edge / 2), cloud(seed + 1, particles, -2, 2));
   c.state.substep = 400;
   // Laid out where the poses put them beside the cloud.
   for (int k = 0; k < 2; ++k) {
     Eigen::Matrix3Xd x = cloud(seed + 2 + k, per_wall, -edge / 2, edge / 2);
     x.row(2).array() -= edge / 2;
-    const Pose pose =
-        pose_at(c.scene.containers[static_cast<std::size_t>(k)], c.scene.time_at(400));
+    const Pose pose = pose_at(c.scene.containers[static_cast<std::size_t>(k)], c.scene.time_at(400));
     for (auto column : x.colwise()) column = pose.to_local(column);
     c.walls.containers.push_back({x});
   }
@@ -64,8 +60,7 @@ Vec3 shortest(const Domain& domain, Vec3 gap) {
 Expected::Expected(const Case& c, const StageInputs& given) {
   const Scene& s = c.scene;
   const double H = s.support_ratio * s.particle_spacing, rho0 = s.fluid.rest_density;
-  const double m = s.mass_ratio * rho0 * std::pow(s.particle_spacing, 3),
-               gamma = s.fluid.eos_exponent;
+  const double m = s.mass_ratio * rho0 * std::pow(s.particle_spacing, 3), gamma = s.fluid.eos_exponent;
   const double B = rho0 * s.fluid.sound_speed * s.fluid.sound_speed / gamma;
   const PlainKernel kernel{s.kernel, H};
   const PosedWalls wall = c.posed();
@@ -82,8 +77,8 @@ Expected::Expected(const Case& c, const StageInputs& given) {
     fields.boundary_volume[b] = 1 / sum;
   }
   fields.density.setConstant(m * kernel.W(0));
-  for (auto* list : {&fields.fluid_neighbor_count, &fields.fluid_neighbor_id_sum,
-                     &fields.wall_neighbor_count, &fields.wall_neighbor_id_sum})
+  for (auto* list : {&fields.fluid_neighbor_count, &fields.fluid_neighbor_id_sum, &fields.wall_neighbor_count,
+                     &fields.wall_neighbor_id_sum})
     list->setZero();
   for (Eigen::Index i = 0; i < n; ++i) {
     for (Eigen::Index j = 0; j < n; ++j) {
@@ -107,11 +102,10 @@ Expected::Expected(const Case& c, const StageInputs& given) {
   pressure_size = B * ((rho / rho0).array().pow(gamma) + 1);
   const Eigen::VectorXd p = given.pressure.size() ? given.pressure : fields.pressure;
   const Eigen::ArrayXd q = p.array() / rho.array().square();
-  const Eigen::ArrayXd q_size = given.pressure.size()
-                                    ? q.abs().eval()
-                                    : (pressure_size.array() / rho.array().square()).eval();
-  for (auto* a : {&fields.pressure_acceleration, &fields.viscous_acceleration,
-                  &fields.wall_pressure_acceleration, &fields.wall_viscous_acceleration})
+  const Eigen::ArrayXd q_size =
+      given.pressure.size() ? q.abs().eval() : (pressure_size.array() / rho.array().square()).eval();
+  for (auto* a : {&fields.pressure_acceleration, &fields.viscous_acceleration, &fields.wall_pressure_acceleration,
+                  &fields.wall_viscous_acceleration})
     a->setZero();
   for (Eigen::Index i = 0; i < n; ++i) {
     for (Eigen::Index j = 0; j < n; ++j) {
@@ -120,8 +114,7 @@ Expected::Expected(const Case& c, const StageInputs& given) {
       if (i == j || r >= H) continue;
       fields.pressure_acceleration.col(i) += m * (q[i] + q[j]) * kernel.G(r) * x_ij;
       size(0, i) += m * (q_size[i] + q_size[j]) * kernel.slope(r);
-      const Vec3 drag =
-          s.fluid.viscosity / rho[i] * m / rho[j] * (v.col(j) - v.col(i)) * kernel.L(r);
+      const Vec3 drag = s.fluid.viscosity / rho[i] * m / rho[j] * (v.col(j) - v.col(i)) * kernel.L(r);
       fields.viscous_acceleration.col(i) += drag;
       size(1, i) += drag.norm();
     }
@@ -131,8 +124,7 @@ Expected::Expected(const Case& c, const StageInputs& given) {
       if (r >= H) continue;
       fields.wall_pressure_acceleration.col(i) += rho0 * V * q[i] * kernel.G(r) * x_ib;
       size(2, i) += rho0 * V * q_size[i] * kernel.slope(r);
-      const Vec3 drag =
-          s.fluid.wall_viscosity / rho[i] * V * (wall.velocity.col(b) - v.col(i)) * kernel.L(r);
+      const Vec3 drag = s.fluid.wall_viscosity / rho[i] * V * (wall.velocity.col(b) - v.col(i)) * kernel.L(r);
       fields.wall_viscous_acceleration.col(i) += drag;
       size(3, i) += drag.norm();
     }
@@ -162,19 +154,14 @@ bool as_expected(const Case& c, double tolerance, const StageInputs& given = {})
     return ((found - right).colwise().norm().array() <= tolerance * size.array()).all();
   };
   const Eigen::RowVectorXd all = expected.size.colwise().sum().array() + c.scene.gravity.norm();
-  return near(out.boundary_volume, e.boundary_volume, e.boundary_volume) &&
-         near(out.density, e.density, e.density) &&
+  return near(out.boundary_volume, e.boundary_volume, e.boundary_volume) && near(out.density, e.density, e.density) &&
          near(out.pressure, e.pressure, expected.pressure_size) &&
          near_columns(out.pressure_acceleration, e.pressure_acceleration, expected.size.row(0)) &&
          near_columns(out.viscous_acceleration, e.viscous_acceleration, expected.size.row(1)) &&
-         near_columns(out.wall_pressure_acceleration, e.wall_pressure_acceleration,
-                      expected.size.row(2)) &&
-         near_columns(out.wall_viscous_acceleration, e.wall_viscous_acceleration,
-                      expected.size.row(3)) &&
-         near_columns(out.acceleration, e.acceleration, all) &&
-         out.fluid_neighbor_count == e.fluid_neighbor_count &&
-         out.fluid_neighbor_id_sum == e.fluid_neighbor_id_sum &&
-         out.wall_neighbor_count == e.wall_neighbor_count &&
+         near_columns(out.wall_pressure_acceleration, e.wall_pressure_acceleration, expected.size.row(2)) &&
+         near_columns(out.wall_viscous_acceleration, e.wall_viscous_acceleration, expected.size.row(3)) &&
+         near_columns(out.acceleration, e.acceleration, all) && out.fluid_neighbor_count == e.fluid_neighbor_count &&
+         out.fluid_neighbor_id_sum == e.fluid_neighbor_id_sum && out.wall_neighbor_count == e.wall_neighbor_count &&
          out.wall_neighbor_id_sum == e.wall_neighbor_id_sum;
 }
 

@@ -83,8 +83,7 @@ TEST_F(FixtureFile, WhatWouldBeRefusedIsNotWritten) {
 }
 
 TEST_F(FixtureFile, Sha256IsThatOfTheStandard) {
-  EXPECT_EQ(sha256_of_text("abc"),
-            "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  EXPECT_EQ(sha256_of_text("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
 }
 
 }  // namespace

@@ -26,8 +26,8 @@ class ForeignPort : public test::ResultsFile {
   }
   static std::filesystem::path inputs_file() { return *folder_ / "inputs.h5"; }
   static int run_port(const std::string& fault) {
-    return test::run_python({root + "/tools/numpy_port.py", inputs_file().string(), "--out",
-                             results_file().string(), "--fault", fault});
+    return test::run_python(
+        {root + "/tools/numpy_port.py", inputs_file().string(), "--out", results_file().string(), "--fault", fault});
   }
 };
 
@@ -44,9 +44,7 @@ TEST_F(ForeignPort, WritesFilesAsDocumented) {
   EXPECT_EQ(schema_of(inputs_file()), 0);
   ASSERT_EQ(run_port("none"), 0);
   EXPECT_EQ(schema_of(results_file()), 0);
-  write([&](Hdf5Writer& out) {
-    out.integers("/fields/density", IdVector::Ones(fixture_->state.size()));
-  });
+  write([&](Hdf5Writer& out) { out.integers("/fields/density", IdVector::Ones(fixture_->state.size())); });
   EXPECT_EQ(schema_of(results_file()), 1) << "density in integers";
 }
 
@@ -67,23 +65,19 @@ TEST_P(FaultyPort, FailsTheCheckThatIsThereForIt) {
   const ResultsOutcome outcome = judged();
   EXPECT_EQ(outcome.status, 1);
   EXPECT_EQ(row_of(outcome, fault.check, fault.field).verdict, Verdict::fail) << outcome.table;
-  EXPECT_EQ(row_of(outcome, fault.clean_check, fault.clean_field).verdict, Verdict::pass)
-      << outcome.table;
+  EXPECT_EQ(row_of(outcome, fault.clean_check, fault.clean_field).verdict, Verdict::pass) << outcome.table;
 }
 
 INSTANTIATE_TEST_SUITE_P(
     EachFault, FaultyPort,
-    testing::Values(
-        PortFault{"viscosity", "acceleration", "viscous_acceleration", "acceleration",
-                  "wall_viscous_acceleration"},
-        PortFault{"neighbor", "neighbors", "fluid_neighbor_count", "neighbors",
-                  "wall_neighbor_count"},
-        PortFault{"volume", "boundary_volume", "boundary_volume", "acceleration",
-                  "pressure_acceleration"},
-        PortFault{"self", "density", "density", "acceleration", "acceleration"},
-        PortFault{"wall-at-rest", "acceleration", "wall_viscous_acceleration", "acceleration",
-                  "wall_pressure_acceleration"},
-        PortFault{"nan", "density", "density", "pressure", "pressure"}),
+    testing::Values(PortFault{"viscosity", "acceleration", "viscous_acceleration", "acceleration",
+                              "wall_viscous_acceleration"},
+                    PortFault{"neighbor", "neighbors", "fluid_neighbor_count", "neighbors", "wall_neighbor_count"},
+                    PortFault{"volume", "boundary_volume", "boundary_volume", "acceleration", "pressure_acceleration"},
+                    PortFault{"self", "density", "density", "acceleration", "acceleration"},
+                    PortFault{"wall-at-rest", "acceleration", "wall_viscous_acceleration", "acceleration",
+                              "wall_pressure_acceleration"},
+                    PortFault{"nan", "density", "density", "pressure", "pressure"}),
     [](const testing::TestParamInfo<PortFault>& of) {
       std::string name = of.param.name;
       std::erase(name, '-');

@@ -27,20 +27,19 @@ std::size_t at(Enum value) {
 }  // namespace
 
 std::map<std::string, std::string> choices(const Forms& f) {
-  const Choice all[] = {
-      {"register", {"parts", "gravity first", "gravity last"}, at(f.accumulate)},
-      {"order", {"by id", "smallest first", "largest first", "random", "pairwise"}, at(f.order)},
-      {"root", {"root", "r2 * (1/root)"}, at(f.root)},
-      {"power", {"products", "pow"}, at(f.power)},
-      {"polynomial", {"horner", "monomials", "factored"}, at(f.polynomial)},
-      {"frame", {"world", "cell"}, at(f.frame)},
-      {"placing", {"R l + t", "p + R (l + o - P)", "quaternion"}, at(f.placing)},
-      {"velocity", {"omega x (x - p)", "omega x R (l + o - P)"}, at(f.velocity)},
-      {"constants", {"rounded", "formed in fp32"}, at(f.constants)},
-      {"image", {"of difference", "ghost"}, at(f.image)},
-      {"quotient", {"divided", "by inverse"}, at(f.quotient)},
-      {"factor", {"in terms", "after sum"}, at(f.factor)},
-      {"fused", {"no", "yes"}, f.fused}};
+  const Choice all[] = {{"register", {"parts", "gravity first", "gravity last"}, at(f.accumulate)},
+                        {"order", {"by id", "smallest first", "largest first", "random", "pairwise"}, at(f.order)},
+                        {"root", {"root", "r2 * (1/root)"}, at(f.root)},
+                        {"power", {"products", "pow"}, at(f.power)},
+                        {"polynomial", {"horner", "monomials", "factored"}, at(f.polynomial)},
+                        {"frame", {"world", "cell"}, at(f.frame)},
+                        {"placing", {"R l + t", "p + R (l + o - P)", "quaternion"}, at(f.placing)},
+                        {"velocity", {"omega x (x - p)", "omega x R (l + o - P)"}, at(f.velocity)},
+                        {"constants", {"rounded", "formed in fp32"}, at(f.constants)},
+                        {"image", {"of difference", "ghost"}, at(f.image)},
+                        {"quotient", {"divided", "by inverse"}, at(f.quotient)},
+                        {"factor", {"in terms", "after sum"}, at(f.factor)},
+                        {"fused", {"no", "yes"}, f.fused}};
   std::map<std::string, std::string> names;
   for (const Choice& c : all) names[c.name] = c.values[c.chosen];
   return names;
@@ -69,14 +68,10 @@ Forms random_forms(std::mt19937& random) {
 
 Fixture random_form_case(std::uint32_t seed) {
   std::mt19937 random(seed);
-  const auto real = [&](double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(random);
-  };
+  const auto real = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
   const auto chance = [&](double p) { return real(0, 1) < p; };
   const auto pick = [&](int n) { return std::uniform_int_distribution<int>(0, n - 1)(random); };
-  const auto vector = [&](double most) {
-    return Vec3(real(-most, most), real(-most, most), real(-most, most));
-  };
+  const auto vector = [&](double most) { return Vec3(real(-most, most), real(-most, most), real(-most, most)); };
   Fixture f;
   f.name = f.phase = "forms-" + std::to_string(seed);
   Scene& scene = f.scene;
@@ -129,8 +124,7 @@ Fixture random_form_case(std::uint32_t seed) {
       for (int i = 0; i < count.x(); ++i)
         if (chance(filled)) {
           Vec3 at = spacing * (Vec3(i, j, k) + Vec3::Constant(0.5)) + jitter * spacing * vector(1);
-          if (periodic >= 0)
-            at[periodic] -= size[periodic] * std::floor(at[periodic] / size[periodic]);
+          if (periodic >= 0) at[periodic] -= size[periodic] * std::floor(at[periodic] / size[periodic]);
           x.push_back(tank ? pose.to_world(at) : corner + at);
         }
   const auto n = static_cast<Eigen::Index>(x.size());

@@ -19,15 +19,11 @@ namespace {
 using F3 = std::array<float, 3>;
 using Term = std::array<float, 2>;  // a product
 
-F3 float3(const Vec3& v) {
-  return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
-}
+F3 float3(const Vec3& v) { return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])}; }
 F3 operator+(F3 a, F3 b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
 F3 operator-(F3 a, F3 b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 F3 operator*(float s, F3 a) { return {s * a[0], s * a[1], s * a[2]}; }
-F3 cross(F3 a, F3 b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
+F3 cross(F3 a, F3 b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
 
 class Evaluator {
  public:
@@ -41,8 +37,7 @@ class Evaluator {
     mu_w = static_cast<float>(fluid.wall_viscosity);
     gamma = static_cast<float>(fluid.eos_exponent);
     if (f.constants == Forms::Constant::formed) {
-      const float dx = static_cast<float>(scene.particle_spacing),
-                  c0 = static_cast<float>(fluid.sound_speed);
+      const float dx = static_cast<float>(scene.particle_spacing), c0 = static_cast<float>(fluid.sound_speed);
       H = static_cast<float>(scene.support_ratio) * dx;
       h = 0.5f * H;
       m = static_cast<float>(scene.mass_ratio) * rho0 * dx * dx * dx;
@@ -103,9 +98,7 @@ class Evaluator {
     if (f.root == Forms::Root::root) return std::sqrt(r2);
     return r2 > 0 ? r2 * (1.0f / std::sqrt(r2)) : 0.0f;
   }
-  float q_of(float r) const {
-    return f.quotient == Forms::Quotient::by_inverse ? r * inverse_h : r / h;
-  }
+  float q_of(float r) const { return f.quotient == Forms::Quotient::by_inverse ? r * inverse_h : r / h; }
 
   float W(float r2) const {
     const float q = q_of(length(r2));
@@ -118,10 +111,8 @@ class Evaluator {
           const float t = 1.0f - q;
           return w * (outer - t * t * t);
         }
-        if (f.polynomial == Forms::Polynomial::monomials)
-          return w * (1.0f - 1.5f * q * q + 0.75f * q * q * q);
-        return w * (f.fused ? std::fma(q * q, std::fma(0.75f, q, -1.5f), 1.0f)
-                            : 1.0f + q * q * (0.75f * q - 1.5f));
+        if (f.polynomial == Forms::Polynomial::monomials) return w * (1.0f - 1.5f * q * q + 0.75f * q * q * q);
+        return w * (f.fused ? std::fma(q * q, std::fma(0.75f, q, -1.5f), 1.0f) : 1.0f + q * q * (0.75f * q - 1.5f));
       }
       case KernelFamily::wendland_c2: {
         if (f.polynomial == Forms::Polynomial::factored) {
@@ -148,7 +139,7 @@ class Evaluator {
         if (q < 1) return g * (3.0f - 2.25f * q);
         const float s = 2.0f - q;
         return f.quotient == Forms::Quotient::by_inverse ? (0.75f * g * h) * (1.0f / r) * (s * s)
-                                                        : g * 0.75f * s * s / q;
+                                                         : g * 0.75f * s * s / q;
       }
       case KernelFamily::wendland_c2: {
         const float s = 1.0f - 0.5f * q;
@@ -171,8 +162,7 @@ class Evaluator {
     return 2.0f * r2 * G_at / (r2 + soft);
   }
   float pressure(float rho) const {
-    const float s =
-        f.quotient == Forms::Quotient::by_inverse ? rho * inverse_rho0 : rho / rho0;
+    const float s = f.quotient == Forms::Quotient::by_inverse ? rho * inverse_rho0 : rho / rho0;
     float power = s;
     if (f.power == Forms::Power::pow) {
       power = std::pow(s, gamma);
@@ -221,8 +211,8 @@ class Evaluator {
 };
 
 /// Wall particles in the world and their velocities, by the poses that the oracle hands out.
-void place(const Forms& f, const Scene& scene, const Walls& walls, double time,
-           std::vector<F3>& position, std::vector<F3>& velocity) {
+void place(const Forms& f, const Scene& scene, const Walls& walls, double time, std::vector<F3>& position,
+           std::vector<F3>& velocity) {
   for (std::size_t c = 0; c < walls.containers.size(); ++c) {
     const Container& container = scene.containers[c];
     const Pose pose = pose_at(container, time);
@@ -242,8 +232,7 @@ void place(const Forms& f, const Scene& scene, const Walls& walls, double time,
       for (int row = 0; row < 3; ++row) {
         const F3 R = float3(pose.rotation.row(row));
         out[static_cast<std::size_t>(row)] =
-            f.fused ? std::fma(R[0], a[0], std::fma(R[1], a[1], R[2] * a[2]))
-                    : R[0] * a[0] + R[1] * a[1] + R[2] * a[2];
+            f.fused ? std::fma(R[0], a[0], std::fma(R[1], a[1], R[2] * a[2])) : R[0] * a[0] + R[1] * a[1] + R[2] * a[2];
       }
       return out;
     };
@@ -266,13 +255,12 @@ void place(const Forms& f, const Scene& scene, const Walls& walls, double time,
 
 }  // namespace
 
-Fields evaluate_by(const Forms& forms, const Scene& scene, const Walls& walls,
-                   const ParticleState& state, const StageInputs* given) {
+Fields evaluate_by(const Forms& forms, const Scene& scene, const Walls& walls, const ParticleState& state,
+                   const StageInputs* given) {
   Evaluator e(forms, scene);
   const double time = scene.time_at(state.substep);
   Neighbors near;
-  find_neighbors(scene, state.position, pose_walls(scene, walls, time).position,
-                 NeighborSearch::cells, near);
+  find_neighbors(scene, state.position, pose_walls(scene, walls, time).position, NeighborSearch::cells, near);
   const WallNeighbors wall_near = find_wall_neighbors(scene, walls);
   std::vector<F3> wall, wall_v;
   place(forms, scene, walls, time, wall, wall_v);
@@ -337,11 +325,9 @@ Fields evaluate_by(const Forms& forms, const Scene& scene, const Walls& walls,
         parts[3][c].push_back({drag, dv[c]});
       }
     }
-    const float scale[4] = {1.0f, after_sum ? e.mu / rho[i] : 1.0f, 1.0f,
-                            after_sum ? e.mu_w / rho[i] : 1.0f};
-    Eigen::Matrix3Xd Fields::*fields[4] = {
-        &Fields::pressure_acceleration, &Fields::viscous_acceleration,
-        &Fields::wall_pressure_acceleration, &Fields::wall_viscous_acceleration};
+    const float scale[4] = {1.0f, after_sum ? e.mu / rho[i] : 1.0f, 1.0f, after_sum ? e.mu_w / rho[i] : 1.0f};
+    Eigen::Matrix3Xd Fields::* fields[4] = {&Fields::pressure_acceleration, &Fields::viscous_acceleration,
+                                            &Fields::wall_pressure_acceleration, &Fields::wall_viscous_acceleration};
     for (std::size_t c = 0; c < 3; ++c) {
       const auto row = static_cast<Eigen::Index>(c), column = static_cast<Eigen::Index>(i);
       float sum[4];
@@ -369,8 +355,7 @@ std::map<std::string, double> scores(const Fields& got, const OracleAnswer& orac
   const auto score = [&](const char* name, const auto& values, const auto& expected, const auto& tau) {
     double& most = worst[name];
     for (Eigen::Index k = 0; k < values.size(); ++k)
-      most = std::max(most, score_of(std::abs(values.reshaped()[k] - expected.reshaped()[k]),
-                                     tau.reshaped()[k]));
+      most = std::max(most, score_of(std::abs(values.reshaped()[k] - expected.reshaped()[k]), tau.reshaped()[k]));
   };
   for (const StageField& s : stage_fields)
     score(s.name, got.*s.member, oracle.fields.*s.member, oracle.tolerance.*s.member);

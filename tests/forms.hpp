@@ -26,7 +26,7 @@ struct Forms {
   enum class Image { of_difference, ghost } image = Image::of_difference;
   enum class Quotient { divided, by_inverse } quotient = Quotient::divided;  // r/h, rho/rho0, p/rho²
   enum class Factor { in_terms, after_sum } factor = Factor::in_terms;       // of viscosity and density
-  bool fused = false;  // sums by fused multiply-add
+  bool fused = false;                                                        // sums by fused multiply-add
 };
 
 /// Every choice by its name: "order": "pairwise", …
@@ -35,8 +35,8 @@ Forms random_forms(std::mt19937& random);
 
 /// Fields of a state by these forms, its neighbors as the oracle finds them.
 /// \param given  as of Backend::evaluate
-Fields evaluate_by(const Forms& forms, const Scene& scene, const Walls& walls,
-                   const ParticleState& state, const StageInputs* given = nullptr);
+Fields evaluate_by(const Forms& forms, const Scene& scene, const Walls& walls, const ParticleState& state,
+                   const StageInputs* given = nullptr);
 
 /// A few hundred particles that no pour would show: lattices, exact and disturbed by any amount, and
 /// clouds, free and in tanks at rest and tilting about pivots up to 20 m away, H = 2 to 4 dx.

@@ -32,8 +32,7 @@ struct Problem {
     std::string text = fixture.name;
     for (const auto& [name, value] : test::choices(forms)) text += ", " + name + ": " + value;
     const auto expect = [&](const OracleAnswer& oracle, const StageInputs* inputs) {
-      const Fields got =
-          test::evaluate_by(forms, fixture.scene, walls, fixture.state, inputs);
+      const Fields got = test::evaluate_by(forms, fixture.scene, walls, fixture.state, inputs);
       for (const auto& [field, score] : test::scores(got, oracle))
         EXPECT_LE(score, 1) << field << (inputs ? ", staged; " : "; ") << text;
     };
@@ -73,8 +72,8 @@ TEST(LegalForms, MayStartASumFromGravityWhereTermsAreManyAndEqual) {
     f.state.position.resize(3, 343);
     f.state.velocity.setZero(3, 343);
     for (Eigen::Index i = 0; i < 343; ++i) {
-      f.state.position.col(i) = dx * Vec3(static_cast<double>(i % 7), static_cast<double>(i / 7 % 7),
-                                          static_cast<double>(i / 49));
+      f.state.position.col(i) =
+          dx * Vec3(static_cast<double>(i % 7), static_cast<double>(i / 7 % 7), static_cast<double>(i / 49));
       f.state.velocity(2, i) = 1e-4 * static_cast<double>(i % 7);
     }
     f.state.quantise();
@@ -92,17 +91,14 @@ TEST(LegalForms, MayStartASumFromGravityWhereTermsAreManyAndEqual) {
 TEST(LegalForms, AreNotWhatFaultsHideBehind) {
   const Problem problem(read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-filling.h5"));
   const auto score = [&](const char* field, void (*wrong)(Fields&)) {
-    Fields got = test::evaluate_by({}, problem.fixture.scene, problem.walls, problem.fixture.state,
-                                   &problem.staged);
+    Fields got = test::evaluate_by({}, problem.fixture.scene, problem.walls, problem.fixture.state, &problem.staged);
     wrong(got);
     return test::scores(got, problem.given).at(field);
   };
   EXPECT_GT(score("density", [](Fields& f) { f.density *= 1 + 2e-6; }), 1);
   EXPECT_GT(score("pressure", [](Fields& f) { f.pressure *= 1 + 1e-5; }), 1);
   EXPECT_GT(score("viscous_acceleration", [](Fields& f) { f.viscous_acceleration *= 1 + 1e-5; }), 1);
-  EXPECT_GT(score("wall_viscous_acceleration",
-                  [](Fields& f) { f.wall_viscous_acceleration *= 1 + 3e-5; }),
-            1);
+  EXPECT_GT(score("wall_viscous_acceleration", [](Fields& f) { f.wall_viscous_acceleration *= 1 + 3e-5; }), 1);
 }
 
 }  // namespace

@@ -88,8 +88,7 @@ TEST(FrameFile, GivesBackEveryFloatOfEveryFrame) {
     EXPECT_EQ(position[2 * 3 * particles + k], frame.position[k]);
     EXPECT_EQ(velocity[2 * 3 * particles + k], frame.velocity[k]);
   }
-  for (std::size_t k = 0; k < particles; ++k)
-    EXPECT_EQ(pressure[2 * particles + k], frame.pressure[k]);
+  for (std::size_t k = 0; k < particles; ++k) EXPECT_EQ(pressure[2 * particles + k], frame.pressure[k]);
   ASSERT_EQ(wall.size(), 4 * frame.wall.at(0).size());
   EXPECT_EQ(wall[2 * frame.wall[0].size()], frame.wall[0][0]);
 }
@@ -117,7 +116,9 @@ TEST(FrameFile, KeepsASecondPourOut) {
 TEST(FrameFile, RefusesToContinueFramesOfAnotherShape) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene(3);
-  { FrameFile::create(folder / "f.h5", scene, frame_layout(scene, particles), {}); }
+  {
+    FrameFile::create(folder / "f.h5", scene, frame_layout(scene, particles), {});
+  }
   try {
     FrameFile::reopen(folder / "f.h5", frame_layout(scene, particles + 1));
     FAIL() << "must be refused";
@@ -141,7 +142,9 @@ TEST(FrameFile, TakesAsManyBytesAsForetold) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene(40);
   const FrameLayout layout = frame_layout(scene, particles);
-  { FrameFile::create(folder / "f.h5", scene, layout, {}); }
+  {
+    FrameFile::create(folder / "f.h5", scene, layout, {});
+  }
   const auto size = static_cast<std::int64_t>(std::filesystem::file_size(folder / "f.h5"));
   EXPECT_GE(size, frame_file_bytes(layout));
   EXPECT_LE(size, frame_file_bytes(layout) + 20'000);  // HDF5's own structures and the scene
@@ -156,8 +159,7 @@ TEST(CsvWriter, WritesNumbersThatReadBackAsTheSameFloats) {
 
   const auto rows = csv_rows(folder / "csv/fluid_000002.csv");
   ASSERT_EQ(rows.size(), 1u + particles);
-  EXPECT_EQ(rows[0], (std::vector<std::string>{"id", "x", "y", "z", "vx", "vy", "vz", "density",
-                                               "pressure"}));
+  EXPECT_EQ(rows[0], (std::vector<std::string>{"id", "x", "y", "z", "vx", "vy", "vz", "density", "pressure"}));
   for (std::size_t i = 0; i < particles; ++i) {
     const auto& row = rows[i + 1];
     ASSERT_EQ(row.size(), 9u);
@@ -206,7 +208,9 @@ TEST(Xdmf, RefersToDatasetsThatExistWithTheirShapes) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene(3);
   const FrameLayout layout = frame_layout(scene, particles);
-  { FrameFile::create(folder / "frames.h5", scene, layout, {}); }
+  {
+    FrameFile::create(folder / "frames.h5", scene, layout, {});
+  }
   const Hdf5Reader file(folder / "frames.h5");
   const std::vector<double> times = {0, 0.1, 0.2, 0.3};
   const auto fluid = references(frames_xdmf(layout, times, "frames.h5"));
@@ -219,10 +223,9 @@ TEST(Xdmf, RefersToDatasetsThatExistWithTheirShapes) {
 
 TEST(Xdmf, SelectsEachFrameOnceAndGivesItsTime) {
   const Scene scene = test::falling_points_scene(3);
-  const std::string xdmf =
-      frames_xdmf(frame_layout(scene, particles), {0, 0.125, 0.25, 0.375}, "frames.h5");
-  for (const char* part : {"<Time Value=\"0.125\"/>", "<Time Value=\"0.375\"/>",
-                           ">0 0 0 1 1 1 1 7 3<", ">3 0 0 1 1 1 1 7 3<", ">3 0 1 1 1 7<"})
+  const std::string xdmf = frames_xdmf(frame_layout(scene, particles), {0, 0.125, 0.25, 0.375}, "frames.h5");
+  for (const char* part : {"<Time Value=\"0.125\"/>", "<Time Value=\"0.375\"/>", ">0 0 0 1 1 1 1 7 3<",
+                           ">3 0 0 1 1 1 1 7 3<", ">3 0 1 1 1 7<"})
     EXPECT_NE(xdmf.find(part), std::string::npos) << part;
   EXPECT_EQ(xdmf.find(">4 0"), std::string::npos);
 }
@@ -230,8 +233,7 @@ TEST(Xdmf, SelectsEachFrameOnceAndGivesItsTime) {
 TEST(Xdmf, StartsEveryHyperSlabWithItsFrame) {
   // ParaView keeps a geometry for as long as the first node inside its DataItem stays the same.
   const Scene scene = test::falling_points_scene(3);
-  const std::string xdmf =
-      walls_xdmf(frame_layout(scene, particles), {0, 0.125, 0.25, 0.375}, "frames.h5");
+  const std::string xdmf = walls_xdmf(frame_layout(scene, particles), {0, 0.125, 0.25, 0.375}, "frames.h5");
   std::size_t slabs = 0;
   const std::regex slab("ItemType=\"HyperSlab\" Dimensions=\"[0-9 ]+\"><!-- frame ([0-9]) -->");
   for (std::sregex_iterator it(xdmf.begin(), xdmf.end(), slab), end; it != end; ++it)

@@ -196,9 +196,7 @@ TEST(Campaign, EndsWhereItIsToldToAndKeepsWhatItHas) {
 }
 
 TEST(Campaign, HandsOnWhatABackendThrows) {
-  const auto make = [](const std::string&) -> std::unique_ptr<Backend> {
-    throw BackendError("no device");
-  };
+  const auto make = [](const std::string&) -> std::unique_ptr<Backend> { throw BackendError("no device"); };
   const Campaign c = run_campaign(settings_of(3, {"fields"}), make);
   ASSERT_EQ(c.tallies.size(), 1u);
   EXPECT_EQ(c.tallies[0].failed, c.tallies[0].asked);

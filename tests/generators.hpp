@@ -21,23 +21,18 @@ inline double real(double low, double high) {
 
 inline int integer(int low, int high) { return *rc::gen::inRange(low, high + 1); }
 inline bool coin() { return *rc::gen::arbitrary<bool>(); }
-inline Vec3 vec(double low, double high) {
-  return {real(low, high), real(low, high), real(low, high)};
-}
+inline Vec3 vec(double low, double high) { return {real(low, high), real(low, high), real(low, high)}; }
 
 /// n points, uniform in low … high on each axis; the same for the same seed on every machine.
 inline Eigen::Matrix3Xd cloud(int seed, int n, double low, double high) {
   std::mt19937_64 random(static_cast<std::uint64_t>(seed));
   Eigen::Matrix3Xd points(3, n);
-  for (double& x : points.reshaped())
-    x = low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
+  for (double& x : points.reshaped()) x = low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
   return points;
 }
 
 /// A cloud of drawn seed.
-inline Eigen::Matrix3Xd any_cloud(int n, double low, double high) {
-  return cloud(integer(0, 1 << 30), n, low, high);
-}
+inline Eigen::Matrix3Xd any_cloud(int n, double low, double high) { return cloud(integer(0, 1 << 30), n, low, high); }
 
 /// H = 2 cm, dt = 1/1024 s, nothing but room.
 inline Scene open_scene(KernelFamily family = KernelFamily::cubic_spline) {

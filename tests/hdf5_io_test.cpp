@@ -32,8 +32,7 @@ class Hdf5Io : public testing::Test {
 
   fs::path at(const std::string& name) const { return folder_ / name; }
   std::size_t files() const {
-    return static_cast<std::size_t>(
-        std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
   }
 
   fs::path folder_;
@@ -46,8 +45,8 @@ std::string bytes_of(const fs::path& file) {
 
 Eigen::VectorXd awkward_values() {
   Eigen::VectorXd v(6);
-  v << 0.1, -0.0, std::numeric_limits<double>::denorm_min(), 1e308,
-      std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN();
+  v << 0.1, -0.0, std::numeric_limits<double>::denorm_min(), 1e308, std::numeric_limits<double>::infinity(),
+      std::numeric_limits<double>::quiet_NaN();
   return v;
 }
 
@@ -138,7 +137,9 @@ TEST_F(Hdf5Io, TheSameContentGivesTheSameBytes) {
 }
 
 TEST_F(Hdf5Io, WithoutCommitNothingIsLeft) {
-  { Hdf5Writer(at("a.h5")).vector("/v", awkward_values(), "m"); }
+  {
+    Hdf5Writer(at("a.h5")).vector("/v", awkward_values(), "m");
+  }
   EXPECT_EQ(files(), 0u);
 }
 
@@ -187,8 +188,7 @@ TEST_F(Hdf5Io, AFolderThatIsMissingIsAnErrorThatNamesTheFile) {
     Hdf5Writer out(at("no/such/folder.h5"));
     FAIL();
   } catch (const std::runtime_error& error) {
-    EXPECT_NE(std::string(error.what()).find("no/such/folder.h5: cannot be written: No such file"),
-              std::string::npos)
+    EXPECT_NE(std::string(error.what()).find("no/such/folder.h5: cannot be written: No such file"), std::string::npos)
         << error.what();
   }
   EXPECT_THROW(Hdf5Writer{folder_}, std::runtime_error);
@@ -213,10 +213,8 @@ TEST_F(Hdf5Io, AWrongPathClassRankOrLengthIsNamed) {
       {[&] { in.strings("/scene"); }, "/scene", "string scalar", "fixed-length strings [N]"},
       {[&] { in.text("/names"); }, "/names", "string [3]", "fixed-length strings scalar"},
       {[&] { in.text_attribute("/group", "x"); }, "/group@x", "missing", "a fixed-length string"},
-      {[&] { in.text_attribute("/group", "count"); }, "/group@count", "int64 scalar",
-       "a fixed-length string"},
-      {[&] { in.integer_attribute("/group", "length"); }, "/group@length", "float64 scalar",
-       "an integer"},
+      {[&] { in.text_attribute("/group", "count"); }, "/group@count", "int64 scalar", "a fixed-length string"},
+      {[&] { in.integer_attribute("/group", "length"); }, "/group@length", "float64 scalar", "an integer"},
   };
   for (const auto& c : cases) {
     const InputError error = refused(c.read);
@@ -248,12 +246,10 @@ TEST_F(Hdf5Io, ClaimsBeyondTheFileAreRefusedBeforeMemoryIsAskedFor) {
   const hsize_t chunk[2] = {4096, 3};
   H5Pset_chunk(chunked, 2, chunk);
   H5Dclose(H5Dcreate2(file, "/chunked", H5T_IEEE_F64LE, space, H5P_DEFAULT, chunked, H5P_DEFAULT));
-  H5Dclose(
-      H5Dcreate2(file, "/whole", H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+  H5Dclose(H5Dcreate2(file, "/whole", H5T_IEEE_F64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
   const hsize_t small[2] = {10000, 3}, first[2] = {1, 3}, zero[2] = {0, 0};
   const hid_t partial_space = H5Screate_simple(2, small, nullptr);
-  const hid_t partial = H5Dcreate2(file, "/partial", H5T_IEEE_F64LE, partial_space, H5P_DEFAULT,
-                                   chunked, H5P_DEFAULT);
+  const hid_t partial = H5Dcreate2(file, "/partial", H5T_IEEE_F64LE, partial_space, H5P_DEFAULT, chunked, H5P_DEFAULT);
   const hid_t memory = H5Screate_simple(2, first, nullptr);
   H5Sselect_hyperslab(partial_space, H5S_SELECT_SET, zero, nullptr, first, nullptr);
   const double row[3] = {1, 2, 3};
@@ -280,8 +276,7 @@ TEST_F(Hdf5Io, StringsOfVariableLengthAreRefused) {
   H5Aclose(attribute);
   H5Fclose(file);
   const Hdf5Reader in(at("a.h5"));
-  EXPECT_EQ(refused([&] { in.text_attribute("/", "vague"); }).value(),
-            "variable-length string scalar");
+  EXPECT_EQ(refused([&] { in.text_attribute("/", "vague"); }).value(), "variable-length string scalar");
 }
 
 TEST_F(Hdf5Io, AnUnsignedNumberBeyondInt64IsRefusedNotClipped) {
@@ -289,8 +284,7 @@ TEST_F(Hdf5Io, AnUnsignedNumberBeyondInt64IsRefusedNotClipped) {
   const hid_t file = H5Fopen(at("a.h5").c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
   const hsize_t one = 1;
   const hid_t space = H5Screate_simple(1, &one, nullptr);
-  const hid_t data =
-      H5Dcreate2(file, "/u", H5T_STD_U64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t data = H5Dcreate2(file, "/u", H5T_STD_U64LE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
   const std::uint64_t value = std::uint64_t{1} << 63;
   H5Dwrite(data, H5T_NATIVE_UINT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &value);
   H5Dclose(data);

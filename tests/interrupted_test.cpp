@@ -9,8 +9,8 @@
 #include "tools/commands.hpp"
 
 #include <gtest/gtest.h>
-#include <nlohmann/json.hpp>
 #include <sys/wait.h>
+#include <nlohmann/json.hpp>
 
 #include <chrono>
 #include <cstdio>
@@ -33,18 +33,16 @@ std::string text_of(const fs::path& file) {
 
 /// What becomes of `work`, in a child, that gets the signal as soon as it has said something on `heard`.
 struct Interrupted {
-  int status = -1;      // exit status, or −n after signal n
-  double seconds = 0;   // from the signal to the end
+  int status = -1;     // exit status, or −n after signal n
+  double seconds = 0;  // from the signal to the end
   std::string out;
 };
 
-Interrupted interrupted(const TemporaryFolder& folder, int number,
-                        const std::function<int()>& work) {
+Interrupted interrupted(const TemporaryFolder& folder, int number, const std::function<int()>& work) {
   const fs::path out = folder / "stdout", err = folder / "stderr";
   const pid_t child = ::fork();
   if (child == 0) {
-    if (!std::freopen(out.c_str(), "w", stdout) || !std::freopen(err.c_str(), "w", stderr))
-      ::_exit(99);
+    if (!std::freopen(out.c_str(), "w", stdout) || !std::freopen(err.c_str(), "w", stderr)) ::_exit(99);
     std::setvbuf(stderr, nullptr, _IONBF, 0);
     int status = exit_failure;
     try {
@@ -55,8 +53,7 @@ Interrupted interrupted(const TemporaryFolder& folder, int number,
     ::_exit(status);
   }
   const auto said = [](const fs::path& file) { return fs::exists(file) && fs::file_size(file) > 0; };
-  for (int k = 0; k < 3000 && !said(out) && !said(err); ++k)
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  for (int k = 0; k < 3000 && !said(out) && !said(err); ++k) std::this_thread::sleep_for(std::chrono::milliseconds(20));
   ::kill(child, number);
   const auto start = std::chrono::steady_clock::now();
   Interrupted result;
@@ -140,8 +137,8 @@ TEST(InterruptedCommand, ConformKeepsTableReportAndJUnit) {
   // The second recording takes the oracle far longer than the test waits.
   const Interrupted end = interrupted(folder, SIGINT, [&] {
     return command(add_conform_command,
-                   {"conform", fixtures + "hostile-one-particle.h5", fixtures + "pour-56k-stream.h5",
-                    "--backend", "hash", "--executor", "host", "--report", report, "--junit", junit});
+                   {"conform", fixtures + "hostile-one-particle.h5", fixtures + "pour-56k-stream.h5", "--backend",
+                    "hash", "--executor", "host", "--report", report, "--junit", junit});
   });
   EXPECT_EQ(end.status, 128 + SIGINT) << end.out;
   EXPECT_NE(end.out.find(" of 2 judged"), std::string::npos) << end.out;
@@ -161,8 +158,8 @@ TEST(InterruptedCommand, BenchKeepsItsRows) {
   const TemporaryFolder folder;
   const std::string json = folder / "bench.json";
   const Interrupted end = interrupted(folder, SIGTERM, [&] {
-    return command(add_bench_command, {"bench", fixtures + "pour-56k-stream.h5", "--backend",
-                                       "reference:all-pairs", "--json", json});
+    return command(add_bench_command,
+                   {"bench", fixtures + "pour-56k-stream.h5", "--backend", "reference:all-pairs", "--json", json});
   });
   EXPECT_EQ(end.status, 128 + SIGTERM) << end.out;
   EXPECT_NE(end.out.find("interrupted: 0 of 1 timed"), std::string::npos) << end.out;
@@ -175,26 +172,23 @@ TEST(InterruptedCommand, ValidateKeepsTableAndReport) {
   const TemporaryFolder folder;
   const std::string report = folder / "report.h5";
   const Interrupted end = interrupted(folder, SIGINT, [&] {
-    return command(add_validate_command,
-                   {"validate", "still-tank", "--resolution", "40", "--report", report});
+    return command(add_validate_command, {"validate", "still-tank", "--resolution", "40", "--report", report});
   });
   EXPECT_EQ(end.status, 128 + SIGINT) << end.out;
   EXPECT_NE(end.out.find("interrupted: 0 of 1 runs judged"), std::string::npos) << end.out;
-  EXPECT_EQ(Hdf5Reader(report).text_attribute("/provenance", "interrupted"),
-            "interrupted: 0 of 1 runs judged");
+  EXPECT_EQ(Hdf5Reader(report).text_attribute("/provenance", "interrupted"), "interrupted: 0 of 1 runs judged");
 }
 
 TEST(InterruptedCommand, DriftKeepsTableAndReport) {
   const TemporaryFolder folder;
   const std::string report = folder / "report.h5";
   const Interrupted end = interrupted(folder, SIGINT, [&] {
-    return command(add_drift_command, {"drift", fixtures + "pour-56k-stream.h5", "--executor", "host",
-                                       "--report", report});
+    return command(add_drift_command,
+                   {"drift", fixtures + "pour-56k-stream.h5", "--executor", "host", "--report", report});
   });
   EXPECT_EQ(end.status, 128 + SIGINT) << end.out;
   EXPECT_NE(end.out.find("interrupted: 0 of 1 windows measured"), std::string::npos) << end.out;
-  EXPECT_EQ(Hdf5Reader(report).text_attribute("/provenance", "interrupted"),
-            "interrupted: 0 of 1 windows measured");
+  EXPECT_EQ(Hdf5Reader(report).text_attribute("/provenance", "interrupted"), "interrupted: 0 of 1 windows measured");
 }
 
 }  // namespace

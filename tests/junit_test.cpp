@@ -13,8 +13,7 @@
 namespace decant {
 namespace {
 
-CheckRow row(const std::string& backend, const std::string& check, const std::string& field,
-             double score) {
+CheckRow row(const std::string& backend, const std::string& check, const std::string& field, double score) {
   CheckRow r;
   r.backend = backend;
   r.executor = "host";
@@ -49,19 +48,18 @@ std::size_t count(const std::string& text, const std::string& part) {
 }
 
 TEST(Junit, ACheckIsOneCaseHoweverManyFieldsItHas) {
-  const std::string xml = junit_xml(
-      {{row("brute", "substep", "position", 0.5), row("brute", "substep", "velocity", 0.25),
-        row("brute", "density", "density", 0.1)},
-       {}});
+  const std::string xml =
+      junit_xml({{row("brute", "substep", "position", 0.5), row("brute", "substep", "velocity", 0.25),
+                  row("brute", "density", "density", 0.1)},
+                 {}});
   EXPECT_EQ(count(xml, "<testcase "), 2u) << xml;
   EXPECT_EQ(count(xml, R"(tests="2" failures="0" errors="0" skipped="0")"), 2u) << xml;
 }
 
 TEST(Junit, AFailureTellsTheWorstFieldWithParticleValueToleranceAndScore) {
-  const std::string xml =
-      junit_xml({{row("brute", "substep", "position", 3), row("brute", "substep", "velocity", 31),
-                  row("brute", "density", "density", 0.1)},
-                 {}});
+  const std::string xml = junit_xml({{row("brute", "substep", "position", 3), row("brute", "substep", "velocity", 31),
+                                      row("brute", "density", "density", 0.1)},
+                                     {}});
   EXPECT_NE(xml.find("message=\"substep / velocity, particle 17: value 0.0031 kg/m^3, tolerance "
                      "0.0001 kg/m^3, score 31\""),
             std::string::npos)
@@ -79,13 +77,10 @@ TEST(Junit, WhatDidNotRunIsSkippedAndAPassWithoutAScoreFails) {
   EXPECT_NE(xml.find(R"(tests="2" failures="1" errors="0" skipped="1")"), std::string::npos) << xml;
 }
 
-TEST(Junit, AnEmptyReportHasNoCases) {
-  EXPECT_NE(junit_xml({}).find(R"(tests="0")"), std::string::npos);
-}
+TEST(Junit, AnEmptyReportHasNoCases) { EXPECT_NE(junit_xml({}).find(R"(tests="0")"), std::string::npos); }
 
 TEST(XmlEscaped, KeepsTextAndReplacesWhatXmlCannotHold) {
-  EXPECT_EQ(xml_escaped("a<b> & \"c\" 'd'\n\te"),
-            "a&lt;b&gt; &amp; &quot;c&quot; &apos;d&apos;\n\te");
+  EXPECT_EQ(xml_escaped("a<b> & \"c\" 'd'\n\te"), "a&lt;b&gt; &amp; &quot;c&quot; &apos;d&apos;\n\te");
   EXPECT_EQ(xml_escaped("ρ₀ 𝄞"), "ρ₀ 𝄞");
   EXPECT_EQ(xml_escaped(std::string("\0\x1b\x7f", 3)), "���");
   // A byte alone, one that goes on too soon, overlong, a surrogate, a character cut off.
@@ -101,9 +96,8 @@ TEST(Junit, IsReadByAnXmlParserWithEveryCharacterInItsPlace) {
   const test::TemporaryFolder folder;
   CheckRow awkward = row("b<r>", "density", "den\"sity'", 31);
   awkward.reason = "]]> & <!-- \x1b ρ \xff";
-  write_text_file(folder / "junit.xml",
-                  junit_xml({{awkward, row("brute", "density", "density", 0.5), not_run("list")},
-                             {{"device.<x>", "a & b"}}}));
+  write_text_file(folder / "junit.xml", junit_xml({{awkward, row("brute", "density", "density", 0.5), not_run("list")},
+                                                   {{"device.<x>", "a & b"}}}));
   write_text_file(folder / "read.py", R"(
 import sys
 from xml.etree import ElementTree

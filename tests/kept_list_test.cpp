@@ -27,9 +27,7 @@ class KeptList : public testing::TestWithParam<Executor> {
     std::string why_not;
     if (!executor_available(GetParam(), &why_not)) GTEST_SKIP() << why_not;
   }
-  static std::unique_ptr<Backend> make(const std::string& name) {
-    return test::make_variant(name, GetParam());
-  }
+  static std::unique_ptr<Backend> make(const std::string& name) { return test::make_variant(name, GetParam()); }
 };
 
 std::string executor_name(const testing::TestParamInfo<Executor>& info) {
@@ -144,8 +142,9 @@ TEST_P(KeptList, OfParticlesThatStartToFallIsMadeAnewInTime) {
 
 TEST_P(KeptList, MissesNoPairOfRandomScenes) {
   std::int64_t pairs = 0;
-  for (const char* name : {"list:check_completeness=on", "list:check_completeness=on:skin=0.05", "list:check_completeness=on:criterion=relative",
-                           "list:check_completeness=on:build=all-pairs"})
+  for (const char* name :
+       {"list:check_completeness=on", "list:check_completeness=on:skin=0.05",
+        "list:check_completeness=on:criterion=relative", "list:check_completeness=on:build=all-pairs"})
     for (std::uint32_t seed = 100; seed < 112; ++seed) {
       const Fixture f = test::random_fixture(seed);
       const auto list = make(name);
@@ -186,7 +185,8 @@ TEST_P(KeptList, MissesNoPairOfAPistonThatComesUponFluidAtRest) {
   scene.schedule.substeps_per_frame = substeps_for(scene);
   check_scene(scene, scene.name);
   const Walls walls = sample_walls(scene);
-  for (const char* name : {"list:check_completeness=on", "list:check_completeness=on:skin=0.2", "list:check_completeness=on:criterion=relative"}) {
+  for (const char* name : {"list:check_completeness=on", "list:check_completeness=on:skin=0.2",
+                           "list:check_completeness=on:criterion=relative"}) {
     const auto list = make(name);
     list->load(scene, walls, initial_state(scene));
     for (int k = 0; k < 20; ++k) ASSERT_EQ(list->advance(8).bits & Status::missed_pair, 0u) << name;
@@ -201,8 +201,7 @@ TEST_P(KeptList, IsBuiltAnewBecauseThePistonMovesWhateverTheFluidDoes) {
   // A wall that goes 0.02 H a substep, far from fluid that rests: a skin of 0.2 H lasts five substeps.
   Fixture f = flight(Vec3::Zero());
   const double H = f.scene.support_radius(), v = 0.02 * H / f.scene.time_step();
-  f.scene.containers.push_back({"piston", tank_shape(Vec3::Constant(H), 2 * H, {}),
-                                Vec3::Constant(-0.5), 2 * H, {}});
+  f.scene.containers.push_back({"piston", tank_shape(Vec3::Constant(H), 2 * H, {}), Vec3::Constant(-0.5), 2 * H, {}});
   f.scene.containers[0].translation.emplace().velocity = Vec3(v, 0, 0);
   const auto list = make("list:skin=0.2");
   EXPECT_GE(rebuilds_of(*list, f, 90), 90 / 6);
@@ -211,8 +210,7 @@ TEST_P(KeptList, IsBuiltAnewBecauseThePistonMovesWhateverTheFluidDoes) {
 /// What is loaded anew knows nothing of its distance from the walls and looks for them.
 TEST_P(KeptList, WallsThatAreNotLookedForWouldNotHaveTouched) {
   int compared = 0;
-  const auto expect_same = [&](const char* name, const Scene& scene, const ParticleState& start,
-                               int substeps) {
+  const auto expect_same = [&](const char* name, const Scene& scene, const ParticleState& start, int substeps) {
     const Walls walls = sample_walls(scene);
     const auto once = make(name), again = make(name);
     once->load(scene, walls, start);
@@ -225,8 +223,7 @@ TEST_P(KeptList, WallsThatAreNotLookedForWouldNotHaveTouched) {
       ++compared;
       again->read(other);
       once->read(one);
-      ASSERT_TRUE(one.position == other.position && one.velocity == other.velocity)
-          << scene.name << ", substep " << k;
+      ASSERT_TRUE(one.position == other.position && one.velocity == other.velocity) << scene.name << ", substep " << k;
     }
   };
   for (std::uint32_t seed = 200; seed < 212; ++seed) {

@@ -54,8 +54,7 @@ TEST_P(EveryKernel, HasAGradientThatIsTheSlopeOfItsKernel) {
       const double r = H * (k + 0.5) / 200;
       EXPECT_NEAR(-r * kernel.G(r) / slope_of(kernel_of_gradient, r, 1e-6 * H), 1, 1e-4)
           << "H = " << H << ", r/H = " << r / H;
-      EXPECT_NEAR(-r * kernel.G(r), slope_of(kernel_of_gradient, r, 1e-6 * H),
-                  1e-8 * kernel.W(0) / H);
+      EXPECT_NEAR(-r * kernel.G(r), slope_of(kernel_of_gradient, r, 1e-6 * H), 1e-8 * kernel.W(0) / H);
     }
   }
 }

@@ -20,7 +20,7 @@ namespace {
 
 const std::filesystem::path scenes = std::filesystem::path(DECANT_SOURCE_DIR) / "fixtures/scenes";
 
-constexpr double dx = 0.01;   // m
+constexpr double dx = 0.01;    // m
 constexpr double side = 0.06;  // m, of the cross-section, which repeats along y and z
 
 Container slab(const std::string& name, double x, double thickness) {
@@ -65,8 +65,7 @@ TEST(Piston, PutsItsWorkIntoTheFluid) {
   const auto energy = [&](const Fields& f) {
     double sum = 0;
     for (Eigen::Index i = 0; i < solver.state().size(); ++i)
-      sum += m * (0.5 * solver.state().velocity.col(i).squaredNorm() +
-                  elastic_energy(s, f.density[i]));
+      sum += m * (0.5 * solver.state().velocity.col(i).squaredNorm() + elastic_energy(s, f.density[i]));
     return sum;
   };
   Fields f;
@@ -77,8 +76,7 @@ TEST(Piston, PutsItsWorkIntoTheFluid) {
   for (int k = 0; k < substeps; ++k) {
     const double speed = pose_at(s.containers[0], (k + 0.5) * dt).linear_velocity.x();
     for (Eigen::Index i = 0; i < f.density.size(); ++i)
-      if (solver.state().position(0, i) < 0.05)
-        work += m * f.wall_pressure_acceleration(0, i) * speed * dt;
+      if (solver.state().position(0, i) < 0.05) work += m * f.wall_pressure_acceleration(0, i) * speed * dt;
     solver.substep();
     solver.fields(f);
   }

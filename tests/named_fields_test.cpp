@@ -28,9 +28,7 @@ class NamedFields : public test::ResultsFile {
     fill(out);
     out.commit();
   }
-  static ResultsOutcome judged() {
-    return judge_results_file({results_file(), {}, reference_file(), "port", {}});
-  }
+  static ResultsOutcome judged() { return judge_results_file({results_file(), {}, reference_file(), "port", {}}); }
   /// Status where the port's particle 2 is off by `error`.
   int status_off_by(double error) const {
     Eigen::VectorXd off = x_;
@@ -184,12 +182,10 @@ TEST_F(NamedFields, OfStatesThatAreMissingAreNamedAndCounted) {
   });
   port([&](Hdf5Writer& out) { out.vector("/middle/fields/x", x_, ""); });
   const ResultsOutcome outcome = judged();
-  EXPECT_NE(outcome.line.find("2 of 3 states missing: /early, /late"), std::string::npos)
-      << outcome.line;
+  EXPECT_NE(outcome.line.find("2 of 3 states missing: /early, /late"), std::string::npos) << outcome.line;
   EXPECT_NE(outcome.table.find(outcome.line), std::string::npos);
   port([&](Hdf5Writer& out) {
-    for (const char* state : {"/early", "/middle", "/late"})
-      out.vector(std::string(state) + "/fields/x", x_, "");
+    for (const char* state : {"/early", "/middle", "/late"}) out.vector(std::string(state) + "/fields/x", x_, "");
   });
   EXPECT_EQ(judged().line.find("missing"), std::string::npos);
 }

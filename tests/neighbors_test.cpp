@@ -29,8 +29,7 @@ Scene unit_support(const Vec3& low = Vec3::Zero(), const Vec3& period = Vec3::Ze
 }
 
 /// j near i where some image of x_j is less than 1 m from x_i; i itself left out where `self`.
-Lists by_definition(const Domain& domain, const Eigen::Matrix3Xd& of, const Eigen::Matrix3Xd& in,
-                    bool self) {
+Lists by_definition(const Domain& domain, const Eigen::Matrix3Xd& of, const Eigen::Matrix3Xd& in, bool self) {
   Lists lists(static_cast<std::size_t>(of.cols()));
   for (Eigen::Index i = 0; i < of.cols(); ++i)
     for (Eigen::Index j = 0; j < in.cols(); ++j) {
@@ -38,12 +37,10 @@ Lists by_definition(const Domain& domain, const Eigen::Matrix3Xd& of, const Eige
       for (int a = 0; a < 3; ++a) {
         const double period = domain.periodic[a] ? domain.max[a] - domain.min[a] : 0;
         const double gap = of(a, i) - in(a, j);
-        const double least =
-            std::min({std::abs(gap), std::abs(gap - period), std::abs(gap + period)});
+        const double least = std::min({std::abs(gap), std::abs(gap - period), std::abs(gap + period)});
         squared += least * least;
       }
-      if (squared < 1 && !(self && i == j))
-        lists[static_cast<std::size_t>(i)].push_back(static_cast<std::int32_t>(j));
+      if (squared < 1 && !(self && i == j)) lists[static_cast<std::size_t>(i)].push_back(static_cast<std::int32_t>(j));
     }
   return lists;
 }
@@ -59,8 +56,7 @@ Neighbors found(const Scene& scene, const Eigen::Matrix3Xd& fluid, const Eigen::
 }
 
 /// True where both searches give what the definition gives.
-bool agree(const Scene& scene, const Eigen::Matrix3Xd& fluid,
-           const Eigen::Matrix3Xd& wall = Eigen::Matrix3Xd(3, 0)) {
+bool agree(const Scene& scene, const Eigen::Matrix3Xd& fluid, const Eigen::Matrix3Xd& wall = Eigen::Matrix3Xd(3, 0)) {
   const Lists near_fluid = by_definition(scene.domain, fluid, fluid, true);
   const Lists near_wall = by_definition(scene.domain, fluid, wall, false);
   for (const auto search : {NeighborSearch::all_pairs, NeighborSearch::cells}) {
@@ -99,8 +95,8 @@ Eigen::Matrix3Xd points(const std::vector<Vec3>& list) {
 TEST(Neighbors, AreTheSameByCellsAsByDefinitionInOpenSpace) {
   EXPECT_TRUE(rc::check("open cloud", [] {
     const double low = real(-100, 100), high = low + real(0.01, 12);
-    RC_ASSERT(agree(unit_support(), any_cloud(integer(0, 150), low, high),
-                    any_cloud(integer(0, 60), low - 2, high + 1)));
+    RC_ASSERT(
+        agree(unit_support(), any_cloud(integer(0, 150), low, high), any_cloud(integer(0, 60), low - 2, high + 1)));
   }));
 }
 
@@ -111,11 +107,9 @@ TEST(Neighbors, AreTheSameByCellsAsByDefinitionOnPeriodicAxes) {
     const int axes = integer(1, 3);
     const Vec3 period(size, axes > 1 ? real(0.3, 1) * size : 0, axes > 2 ? real(0.3, 1) * size : 0);
     const Scene scene = unit_support(Vec3::Constant(low), period);
-    Eigen::Matrix3Xd fluid = any_cloud(integer(0, 150), 0, 1),
-                     wall = any_cloud(integer(0, 60), 0, 1);
+    Eigen::Matrix3Xd fluid = any_cloud(integer(0, 150), 0, 1), wall = any_cloud(integer(0, 60), 0, 1);
     for (auto* x : {&fluid, &wall})
-      for (int a = 0; a < 3; ++a)
-        x->row(a) = x->row(a).array() * (period[a] > 0 ? period[a] : size) + low;
+      for (int a = 0; a < 3; ++a) x->row(a) = x->row(a).array() * (period[a] > 0 ? period[a] : size) + low;
     RC_ASSERT(agree(scene, fluid, wall));
   }));
 }
@@ -141,8 +135,7 @@ TEST(Neighbors, AreAscendingAndMutualAndNeverOneself) {
     const Eigen::Matrix3Xd x = any_cloud(integer(2, 150), 0, 3);
     const Lists lists = found(scene, x, x, NeighborSearch::cells).fluid;
     for (std::size_t i = 0; i < lists.size(); ++i) {
-      RC_ASSERT(std::adjacent_find(lists[i].begin(), lists[i].end(), std::greater_equal<>()) ==
-                lists[i].end());
+      RC_ASSERT(std::adjacent_find(lists[i].begin(), lists[i].end(), std::greater_equal<>()) == lists[i].end());
       for (const auto j : lists[i]) {
         RC_ASSERT(j != static_cast<std::int32_t>(i) && j < x.cols());
         const auto& theirs = lists[static_cast<std::size_t>(j)];
@@ -196,8 +189,8 @@ TEST(Neighbors, AreFoundAcrossAPeriodAtItsVeryEdges) {
   for (const double period : {0.7, 2.0, 2.9, 3.0, 3.1, 8.0}) {
     const Scene scene = unit_support(Vec3(-1, 0, 0), Vec3(period, 0, 0));
     const double end = -1 + period;
-    const Lists lists = fluid_lists(
-        scene, points({Vec3(-1, 0, 0), Vec3(end, 0.1, 0), Vec3(std::nextafter(end, -9), 0.2, 0)}));
+    const Lists lists =
+        fluid_lists(scene, points({Vec3(-1, 0, 0), Vec3(end, 0.1, 0), Vec3(std::nextafter(end, -9), 0.2, 0)}));
     for (const auto& list : lists) EXPECT_EQ(list.size(), 2u) << period;
   }
 }
@@ -214,8 +207,7 @@ TEST(Neighbors, DoNotMindALoneOutlier) {
 TEST(Neighbors, AreEachOtherInOnePoint) {
   const Eigen::Matrix3Xd x = Vec3(-3.7, 0.2, 11).replicate(1, 50);
   for (const Vec3& period : {Vec3(0, 0, 0), Vec3(5, 5, 5)})
-    for (const auto& list : fluid_lists(unit_support(Vec3(-5, 0, 9), period), x))
-      EXPECT_EQ(list.size(), 49u);
+    for (const auto& list : fluid_lists(unit_support(Vec3(-5, 0, 9), period), x)) EXPECT_EQ(list.size(), 49u);
 }
 
 TEST(Neighbors, AreNoneWithoutParticles) {

@@ -30,14 +30,14 @@ TEST(BackendOptions, AreTakenByTheirEarlierNamesToo) {
     EXPECT_TRUE(same(parse_options(backend, now), parse_options(backend, before))) << now;
     EXPECT_FALSE(same(parse_options(backend, now), {})) << now;
   }
-  const SolverOptions defaults = parse_options(
-      "hash", "wall_cells=on:moving_walls=body_frame:force_neighbors=cached:sort=counting:launch=auto");
+  const SolverOptions defaults =
+      parse_options("hash", "wall_cells=on:moving_walls=body_frame:force_neighbors=cached:sort=counting:launch=auto");
   EXPECT_TRUE(same(defaults, {}));
 }
 
 TEST(BackendOptions, AreRefusedByKeyValueAndBound) {
-  for (const char* wrong : {"wall_cells=maybe", "wall_cells=on:grid=all", "threads_per_particle=3", "skin=0.1", "colour=red",
-                            "capacity=0", "launch"})
+  for (const char* wrong : {"wall_cells=maybe", "wall_cells=on:grid=all", "threads_per_particle=3", "skin=0.1",
+                            "colour=red", "capacity=0", "launch"})
     EXPECT_THROW(parse_options("hash", wrong), InputError) << wrong;
   try {
     (void)parse_options("list", "criterion=global-local");

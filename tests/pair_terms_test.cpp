@@ -20,13 +20,9 @@ struct Pair {
   Vec3 x_12 = vec(-0.02, 0.02), v_1 = vec(-5, 5), v_2 = vec(-5, 5);
 };
 
-Vec3 viscous_on_1(const Pair& p) {
-  return viscous_term(p.viscosity, p.mass, p.rho_1, p.rho_2, p.v_1, p.v_2, p.L);
-}
+Vec3 viscous_on_1(const Pair& p) { return viscous_term(p.viscosity, p.mass, p.rho_1, p.rho_2, p.v_1, p.v_2, p.L); }
 
-Vec3 viscous_on_2(const Pair& p) {
-  return viscous_term(p.viscosity, p.mass, p.rho_2, p.rho_1, p.v_2, p.v_1, p.L);
-}
+Vec3 viscous_on_2(const Pair& p) { return viscous_term(p.viscosity, p.mass, p.rho_2, p.rho_1, p.v_2, p.v_1, p.L); }
 
 TEST(PairTerms, PushBothPartnersEquallyAndOppositely) {
   EXPECT_TRUE(rc::check("m a_12 == −m a_21", [] {
@@ -96,9 +92,7 @@ TEST(Pressure, CarriesSoundAtTheScenesSpeed) {
     Scene scene = open_scene();
     scene.fluid.eos_exponent = gamma;
     scene.fluid.sound_speed = 12;
-    const auto p = [&](double density) {
-      return pressure_of(density, 1000.0, scene.eos_stiffness(), gamma, true);
-    };
+    const auto p = [&](double density) { return pressure_of(density, 1000.0, scene.eos_stiffness(), gamma, true); };
     EXPECT_NEAR((p(1000.01) - p(999.99)) / 0.02, 144, 1e-4) << "dp/drho = c0², gamma " << gamma;
   }
 }

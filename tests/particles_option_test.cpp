@@ -50,10 +50,8 @@ TEST(ParticlesOption, TooManyIsRefusedAtOnce) {
   const InputError error = refusal(1'000'000'000);
   EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), 1.0);
   EXPECT_EQ(error.key(), "--particles");
-  EXPECT_NE(error.bound().find("500 GB in all, and this machine has 16 GB"), std::string::npos)
-      << error.bound();
-  EXPECT_EQ(refusal(static_cast<std::int64_t>(memory / host_bytes_per_particle) + 1).key(),
-            "--particles");
+  EXPECT_NE(error.bound().find("500 GB in all, and this machine has 16 GB"), std::string::npos) << error.bound();
+  EXPECT_EQ(refusal(static_cast<std::int64_t>(memory / host_bytes_per_particle) + 1).key(), "--particles");
 }
 
 TEST(ParticlesOption, KnowsHowMuchMemoryThereIs) {

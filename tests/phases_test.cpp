@@ -27,14 +27,13 @@ TEST(Phases, FollowFromTheTiltsFirstAndLastKey) {
   const auto part_of_tilt = [&](double fraction) {
     return keys.front().time + fraction * (keys.back().time - keys.front().time);
   };
-  const std::vector<std::pair<std::string, double>> expected = {
-      {"start", 0},
-      {"settled", part_of_tilt(0)},
-      {"tilt-onset", part_of_tilt(0.25)},
-      {"stream", part_of_tilt(0.57)},
-      {"splash", part_of_tilt(0.65)},
-      {"filling", part_of_tilt(0.85)},
-      {"rest", scene.schedule.end}};
+  const std::vector<std::pair<std::string, double>> expected = {{"start", 0},
+                                                                {"settled", part_of_tilt(0)},
+                                                                {"tilt-onset", part_of_tilt(0.25)},
+                                                                {"stream", part_of_tilt(0.57)},
+                                                                {"splash", part_of_tilt(0.65)},
+                                                                {"filling", part_of_tilt(0.85)},
+                                                                {"rest", scene.schedule.end}};
   ASSERT_EQ(phase_names().size(), expected.size());
   for (std::size_t k = 0; k < expected.size(); ++k) {
     const auto& [name, time] = expected[k];
@@ -52,8 +51,8 @@ TEST(Phases, TakeTheNearestSubstepToAGivenTime) {
 
 TEST(Phases, AreRefusedWhereTheyMakeNoSense) {
   const Scene scene = tilting_scene();
-  for (const char* text : {"impact", "=1", "a/b=1", ".a=1", "a=", "a=1s", "a=-0.1", "a=3.3",
-                           "a=nan", "a=inf", "a=1e400"}) {
+  for (const char* text :
+       {"impact", "=1", "a/b=1", ".a=1", "a=", "a=1s", "a=-0.1", "a=3.3", "a=nan", "a=inf", "a=1e400"}) {
     try {
       parse_phase(scene, text);
       ADD_FAILURE() << text;

@@ -112,16 +112,13 @@ const Fault catalogue[] = {
      })},
     {"KernelConstantOffByOneInAHundredThousand", "density", "density",
      field_edit([](const Scene&, Fields& f) { f.density *= 1 + 1e-5; })},
-    {"PressureTensionNotClamped", "pressure", "pressure",
-     scene_edit([](Scene& s) { s.fluid.allow_tension = true; })},
-    {"LinearEquationOfState", "pressure", "pressure",
-     scene_edit([](Scene& s) { s.fluid.eos_exponent = 1; })},
+    {"PressureTensionNotClamped", "pressure", "pressure", scene_edit([](Scene& s) { s.fluid.allow_tension = true; })},
+    {"LinearEquationOfState", "pressure", "pressure", scene_edit([](Scene& s) { s.fluid.eos_exponent = 1; })},
     {"ViscosityOffByAPercent", "acceleration", "viscous_acceleration",
      scene_edit([](Scene& s) { s.fluid.viscosity *= 1.01; })},
     {"WallViscosityOffByAPercent", "acceleration", "wall_viscous_acceleration",
      scene_edit([](Scene& s) { s.fluid.wall_viscosity *= 1.01; })},
-    {"GravityUpward", "acceleration", "acceleration",
-     scene_edit([](Scene& s) { s.gravity = -s.gravity; })},
+    {"GravityUpward", "acceleration", "acceleration", scene_edit([](Scene& s) { s.gravity = -s.gravity; })},
     {"SourceOneSubstepLate", "acceleration", "wall_pressure_acceleration",
      state_edit([](ParticleState& s) { --s.substep; })},
     {"VelocitiesOfAnotherOrder", "acceleration", "viscous_acceleration",
@@ -135,25 +132,20 @@ const Fault catalogue[] = {
     {"NanLane", "density", "density", field_edit([](const Scene&, Fields& f) {
        for (Eigen::Index i = 7; i < f.density.size(); i += 32) f.density[i] = nan;
      })},
-    {"OneValueNotWritten", "pressure", "pressure", field_edit([](const Scene&, Fields& f) {
-       f.pressure.tail(1) = Fields::unwritten(1, 0).pressure;
-     })},
-    {"NothingWritten", "evaluation", "acceleration", field_edit([](const Scene&, Fields& f) {
-       f = Fields::unwritten(f.density.size(), f.boundary_volume.size());
-     })},
-    {"TooFewValues", "density", "density", field_edit([](const Scene&, Fields& f) {
-       f.density.conservativeResize(f.density.size() - 1);
-     })},
-    {"HalfTheTimeStep", "substep", "velocity",
-     scene_edit([](Scene& s) { s.schedule.substeps_per_frame *= 2; })},
-    {"ContactCloserByAPercent", "substep", "position",
-     scene_edit([](Scene& s) { s.contact.distance_ratio *= 0.99; })},
+    {"OneValueNotWritten", "pressure", "pressure",
+     field_edit([](const Scene&, Fields& f) { f.pressure.tail(1) = Fields::unwritten(1, 0).pressure; })},
+    {"NothingWritten", "evaluation", "acceleration",
+     field_edit([](const Scene&, Fields& f) { f = Fields::unwritten(f.density.size(), f.boundary_volume.size()); })},
+    {"TooFewValues", "density", "density",
+     field_edit([](const Scene&, Fields& f) { f.density.conservativeResize(f.density.size() - 1); })},
+    {"HalfTheTimeStep", "substep", "velocity", scene_edit([](Scene& s) { s.schedule.substeps_per_frame *= 2; })},
+    {"ContactCloserByAPercent", "substep", "position", scene_edit([](Scene& s) { s.contact.distance_ratio *= 0.99; })},
     {"NoFriction", "substep", "velocity", scene_edit([](Scene& s) { s.contact.friction = 0; })},
-    {"FrictionOffByAThousandth", "contact", "velocity",
-     scene_edit([](Scene& s) { s.contact.friction *= 1.001; })},
+    {"FrictionOffByAThousandth", "contact", "velocity", scene_edit([](Scene& s) { s.contact.friction *= 1.001; })},
     {"RestitutionOffByAThousandth", "contact", "velocity",
      scene_edit([](Scene& s) { s.contact.restitution *= 1.001; })},
-    {"NeighborLostInARun", "advanced", "fluid_neighbor_count after 9", [] {
+    {"NeighborLostInARun", "advanced", "fluid_neighbor_count after 9",
+     [] {
        Edit edit;
        edit.found = [searches = 0](const Scene&, Neighbors& n, Eigen::VectorXd&) mutable {
          if (++searches > 5) longest(n.fluid).pop_back();
@@ -162,21 +154,19 @@ const Fault catalogue[] = {
      }()},
     {"StateSwapped", "substep", "position",
      result_edit([](ParticleState& s) { s.position.col(1).swap(s.position.col(2)); })},
-    {"StateNan", "substep", "velocity",
-     result_edit([](ParticleState& s) { s.velocity(2, 5) = nan; })},
-    {"SourceLateInARun", "trajectory", "rms_position",
-     state_edit([](ParticleState& s) { --s.substep; })},
+    {"StateNan", "substep", "velocity", result_edit([](ParticleState& s) { s.velocity(2, 5) = nan; })},
+    {"SourceLateInARun", "trajectory", "rms_position", state_edit([](ParticleState& s) { --s.substep; })},
     {"ParticleGoneAtTheEnd", "mass", "finite",
      at_the_end([](ParticleState& s) { s.position.col(9).setConstant(nan); })},
     {"ParticleTwice", "mass", "distinct", at_the_end([](ParticleState& s) {
        s.position.col(3) = s.position.col(4);
        s.velocity.col(3) = s.velocity.col(4);
      })},
-    {"ParticleOutsideTheDomain", "mass", "lost",
-     at_the_end([](ParticleState& s) { s.position(0, 17) = 2; })},
+    {"ParticleOutsideTheDomain", "mass", "lost", at_the_end([](ParticleState& s) { s.position(0, 17) = 2; })},
     {"ParticleInTheReceiversBottom", "containment", "depth",
      at_the_end([](ParticleState& s) { s.position.col(20) = Vec3(0, 0, 0.0045); })},
-    {"ParticleThroughTheReceiversBottom", "containment", "crossings", [] {
+    {"ParticleThroughTheReceiversBottom", "containment", "crossings",
+     [] {
        Edit edit;
        edit.advanced = [](ParticleState& s) {
          if (s.substep == last_substep - 1) s.position.col(20) = Vec3(0, 0, 0.012);
@@ -186,34 +176,30 @@ const Fault catalogue[] = {
      }()},
     {"PairSeenFromOneSide", "conservation", "pressure_momentum",
      list_edit([](Neighbors& n) { longest(n.fluid).pop_back(); })},
-    {"AnotherRunEveryTime", "determinism", "run", [] {
+    {"AnotherRunEveryTime", "determinism", "run",
+     [] {
        Edit edit;
-       edit.advanced = [runs = 0](ParticleState& s) mutable {
-         s.velocity(0, 8) += 1e-13 * ++runs;
-       };
+       edit.advanced = [runs = 0](ParticleState& s) mutable { s.velocity(0, 8) += 1e-13 * ++runs; };
        return edit;
      }()},
-    {"AnotherFieldEveryTime", "determinism", "fields", [] {
+    {"AnotherFieldEveryTime", "determinism", "fields",
+     [] {
        Edit edit;
-       edit.evaluated = [calls = 0](const Scene&, Fields& f) mutable {
-         f.density[0] *= 1 + 1e-15 * ++calls;
-       };
+       edit.evaluated = [calls = 0](const Scene&, Fields& f) mutable { f.density[0] *= 1 + 1e-15 * ++calls; };
        return edit;
      }()},
-    {"OriginTakenForGranted", "invariance", "moved density", [] {
+    {"OriginTakenForGranted", "invariance", "moved density",
+     [] {
        Edit edit;
        edit.loaded = [](Scene& scene, ParticleState& s) {
          if (scene.domain.min.x() == 0) s.position.col(0) += Vec3::Constant(1e-5);
        };
        return edit;
      }()},
-    {"TurnedFallsAslant", "invariance", "turned acceleration",
-     scene_edit([](Scene& s) {
+    {"TurnedFallsAslant", "invariance", "turned acceleration", scene_edit([](Scene& s) {
        if (s.containers[0].origin.x() == 0) s.gravity.y() = 1e-3;
      })},
-    {"FirstIdSpecial", "invariance", "permuted density", list_edit([](Neighbors& n) {
-       n.fluid[0].clear();
-     })},
+    {"FirstIdSpecial", "invariance", "permuted density", list_edit([](Neighbors& n) { n.fluid[0].clear(); })},
 };
 
 class PlantedFault : public testing::TestWithParam<Fault> {
@@ -227,9 +213,7 @@ class PlantedFault : public testing::TestWithParam<Fault> {
     return prepared;
   }
   /// The check whose row this is.
-  static CheckSelection check_of(const std::string& row) {
-    return {all_checks().count(row) ? row : "fields"};
-  }
+  static CheckSelection check_of(const std::string& row) { return {all_checks().count(row) ? row : "fields"}; }
 };
 
 TEST_P(PlantedFault, FailsTheCheckThatIsThereForIt) {
@@ -271,9 +255,9 @@ TEST(SmallestFactors, AreCaughtOnAPour) {
       if (row.check == std::string(check) && row.field == field) return row.score;
     return -1.0;
   };
-  EXPECT_GT(score(scene_edit([](Scene& s) { s.fluid.sound_speed *= std::sqrt(1 + 1e-5); }),
-                  "equation_of_state", "pressure"),
-            1);
+  EXPECT_GT(
+      score(scene_edit([](Scene& s) { s.fluid.sound_speed *= std::sqrt(1 + 1e-5); }), "equation_of_state", "pressure"),
+      1);
   EXPECT_GT(score(scene_edit([](Scene& s) {
                     // gamma alone: B = rho0 c0²/gamma stays
                     s.fluid.eos_exponent *= 1 + 1e-5;
@@ -290,11 +274,9 @@ TEST(SmallestFactors, AreCaughtOnAPour) {
 /// What one evaluation shows thousandfold must show in runs too, wherever viscosity matters.
 TEST(Trajectory, ShowsAPercentOfViscosityInItsEnergy) {
   for (const char* phase : {"settled", "splash"}) {
-    const Fixture fixture =
-        read_fixture(std::string(DECANT_SOURCE_DIR "/fixtures/pour-4k-") + phase + ".h5");
+    const Fixture fixture = read_fixture(std::string(DECANT_SOURCE_DIR "/fixtures/pour-4k-") + phase + ".h5");
     EditedReference backend(scene_edit([](Scene& s) { s.fluid.viscosity *= 1.01; }));
-    for (const CheckRow& row :
-         judge(backend, fixture, prepare(fixture, {"trajectory"}), {"trajectory"})) {
+    for (const CheckRow& row : judge(backend, fixture, prepare(fixture, {"trajectory"}), {"trajectory"})) {
       if (row.field == "energy") {
         EXPECT_GT(row.score, 1) << phase;
       }
@@ -306,8 +288,8 @@ TEST(Trajectory, ShowsAPercentOfViscosityInItsEnergy) {
 /// The bound is wide enough: a run that is disturbed as the ensemble was, by other numbers, passes.
 TEST(Trajectory, PassesDisturbedRuns) {
   const Fixture fixture = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-stream.h5");
-  const Ensemble others = run_ensemble(fixture.scene, sample_walls(fixture.scene), fixture.state,
-                                       fixture.ensemble.substeps, 4, 99);
+  const Ensemble others =
+      run_ensemble(fixture.scene, sample_walls(fixture.scene), fixture.state, fixture.ensemble.substeps, 4, 99);
   const Divergence bound = divergence_bound(fixture.ensemble);
   for (std::size_t k = 0; k < bound.size(); ++k) {
     EXPECT_LT(others.mean[k] + 3 * others.deviation[k], bound[k]) << divergence_names[k];
@@ -335,8 +317,7 @@ TEST(NotANumber, DoesNotHideAmongTheAmbiguous) {
   const auto chosen = [](const std::vector<bool>& ambiguous) {
     return std::find(ambiguous.begin(), ambiguous.end(), true) - ambiguous.begin();
   };
-  const Eigen::Index contact = chosen(oracle.substep.ambiguous),
-                     near_wall = chosen(oracle.own.wall_ambiguous);
+  const Eigen::Index contact = chosen(oracle.substep.ambiguous), near_wall = chosen(oracle.own.wall_ambiguous);
   ASSERT_LT(contact, fixture.state.size());
   ASSERT_LT(near_wall, fixture.state.size());
   const auto verdict = [&](const Edit& edit, const std::string& field) {
@@ -346,16 +327,10 @@ TEST(NotANumber, DoesNotHideAmongTheAmbiguous) {
     return Verdict::not_run;
   };
   for (const double bad : {nan, 1e30}) {
-    EXPECT_EQ(
-        verdict(result_edit([&](ParticleState& s) { s.position(0, contact) = bad; }), "position"),
-        Verdict::fail);
-    EXPECT_EQ(
-        verdict(result_edit([&](ParticleState& s) { s.velocity(2, contact) = bad; }), "velocity"),
-        Verdict::fail);
+    EXPECT_EQ(verdict(result_edit([&](ParticleState& s) { s.position(0, contact) = bad; }), "position"), Verdict::fail);
+    EXPECT_EQ(verdict(result_edit([&](ParticleState& s) { s.velocity(2, contact) = bad; }), "velocity"), Verdict::fail);
   }
-  EXPECT_EQ(verdict(field_edit([&](const Scene&, Fields& f) {
-                      f.wall_neighbor_count[near_wall] = -1;
-                    }),
+  EXPECT_EQ(verdict(field_edit([&](const Scene&, Fields& f) { f.wall_neighbor_count[near_wall] = -1; }),
                     "wall_neighbor_count"),
             Verdict::fail);
 }
@@ -365,9 +340,7 @@ TEST(NotANumber, NeverPasses) {
   const Fixture fixture = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-stream.h5");
   const Judgement oracle = prepare(fixture, {"fields"});
   const std::vector<std::pair<std::string, Eigen::VectorXd Fields::*>> scalars = {
-      {"boundary_volume", &Fields::boundary_volume},
-      {"density", &Fields::density},
-      {"pressure", &Fields::pressure}};
+      {"boundary_volume", &Fields::boundary_volume}, {"density", &Fields::density}, {"pressure", &Fields::pressure}};
   const std::vector<std::pair<std::string, Eigen::Matrix3Xd Fields::*>> vectors = {
       {"pressure_acceleration", &Fields::pressure_acceleration},
       {"viscous_acceleration", &Fields::viscous_acceleration},
@@ -383,11 +356,9 @@ TEST(NotANumber, NeverPasses) {
   };
   for (const double bad : {nan, -nan, std::numeric_limits<double>::infinity()}) {
     for (const auto& [name, member] : scalars)
-      expect_fails(name,
-                   field_edit([&, m = member](const Scene&, Fields& f) { (f.*m)[11] = bad; }));
+      expect_fails(name, field_edit([&, m = member](const Scene&, Fields& f) { (f.*m)[11] = bad; }));
     for (const auto& [name, member] : vectors)
-      expect_fails(name,
-                   field_edit([&, m = member](const Scene&, Fields& f) { (f.*m)(1, 17) = bad; }));
+      expect_fails(name, field_edit([&, m = member](const Scene&, Fields& f) { (f.*m)(1, 17) = bad; }));
   }
 }
 

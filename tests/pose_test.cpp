@@ -105,8 +105,8 @@ TEST(Schedules, HaveRatesThatAreTheirDerivativesWhateverTheySay) {
       RC_ASSERT(std::abs(tilt_at(tilt, t).rate - slope) <= 1200 * d);
     }
     if (!starts_at(translation.keys, t, d)) {
-      const Vec3 slope = (translation_at(translation, t + d).offset -
-                          translation_at(translation, t - d).offset) / (2 * d);
+      const Vec3 slope =
+          (translation_at(translation, t + d).offset - translation_at(translation, t - d).offset) / (2 * d);
       RC_ASSERT((translation_at(translation, t).velocity - slope).norm() <= 2400 * d);
     }
   }));
@@ -222,16 +222,13 @@ TEST(PosedWalls, MoveWithTheDerivativeOfTheirPosition) {
   both.translation->velocity = {0.2, 0, 0};
   scene.containers = {tilting_cup(), tilting_cup(), sway, both};
   scene.containers[1].tilt.reset();
-  const Walls walls{{{cloud(1, 20, -0.1, 0.1)},
-                     {cloud(2, 5, -0.1, 0.1)},
-                     {cloud(3, 9, -0.1, 0.1)},
-                     {cloud(4, 9, -0.1, 0.1)}}};
+  const Walls walls{
+      {{cloud(1, 20, -0.1, 0.1)}, {cloud(2, 5, -0.1, 0.1)}, {cloud(3, 9, -0.1, 0.1)}, {cloud(4, 9, -0.1, 0.1)}}};
   for (const double t : {0.2, 0.7, 1.1, 1.8, 2.3, 2.9, 5.3}) {
     // Of fourth order, so that 1e-9 is beyond both the formula's error and rounding.
     const double d = 3e-4;
     const auto at = [&](double time) { return pose_walls(scene, walls, time).position; };
-    const Eigen::Matrix3Xd slope =
-        (8 * (at(t + d) - at(t - d)) - (at(t + 2 * d) - at(t - 2 * d))) / (12 * d);
+    const Eigen::Matrix3Xd slope = (8 * (at(t + d) - at(t - d)) - (at(t + 2 * d) - at(t - 2 * d))) / (12 * d);
     const PosedWalls now = pose_walls(scene, walls, t);
     EXPECT_LT((now.velocity - slope).colwise().norm().maxCoeff(), 1e-9) << t;
     EXPECT_EQ(now.velocity.middleCols(20, 5).norm(), 0);
@@ -248,8 +245,7 @@ TEST(PosedWalls, StandInTheOrderOfTheContainers) {
   ASSERT_EQ(posed.position.cols(), 25);
   EXPECT_EQ(Vec3(posed.position.col(7)),
             pose_at(scene.containers[0], 1.1).to_world(walls.containers[0].position.col(7)));
-  EXPECT_EQ(Vec3(posed.position.col(22)),
-            scene.containers[1].origin + Vec3(walls.containers[1].position.col(2)));
+  EXPECT_EQ(Vec3(posed.position.col(22)), scene.containers[1].origin + Vec3(walls.containers[1].position.col(2)));
 }
 
 }  // namespace

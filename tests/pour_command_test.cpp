@@ -44,15 +44,14 @@ std::string bytes_of(const fs::path& file) {
   const std::string one = bytes_of(a), other = bytes_of(b);
   const auto at = std::mismatch(one.begin(), one.end(), other.begin(), other.end());
   if (at.first == one.end() && at.second == other.end()) return ::testing::AssertionSuccess();
-  return ::testing::AssertionFailure()
-         << a << " and " << b << " differ from byte " << at.first - one.begin() << " on";
+  return ::testing::AssertionFailure() << a << " and " << b << " differ from byte " << at.first - one.begin() << " on";
 }
 
 /// Columns that say how the fluid moved, and not how long that took.
 void expect_same_timeline(const fs::path& a, const fs::path& b) {
   const Hdf5Reader one(a), other(b);
-  for (const char* column : {"/time", "/kinetic_energy", "/max_density", "/deepest", "/mass/source",
-                             "/mass/in_flight", "/mass/receiver"})
+  for (const char* column :
+       {"/time", "/kinetic_energy", "/max_density", "/deepest", "/mass/source", "/mass/in_flight", "/mass/receiver"})
     EXPECT_EQ(one.vector(column), other.vector(column)) << column;
   for (const char* column : {"/substep", "/inside", "/crossed", "/particles/receiver"})
     EXPECT_EQ(one.integers(column), other.integers(column)) << column;
@@ -82,11 +81,9 @@ TEST(Pour, LeavesWholeFilesAndNoTraceOfTheWork) {
   EXPECT_TRUE(result.finished);
   EXPECT_EQ(result.summary.substeps, 60);
   std::vector<std::string> names;
-  for (const auto& entry : fs::directory_iterator(folder / "out"))
-    names.push_back(entry.path().filename().string());
+  for (const auto& entry : fs::directory_iterator(folder / "out")) names.push_back(entry.path().filename().string());
   std::sort(names.begin(), names.end());
-  EXPECT_EQ(names,
-            (std::vector<std::string>{"frames.h5", "frames.xdmf", "timeline.h5", "walls.xdmf"}));
+  EXPECT_EQ(names, (std::vector<std::string>{"frames.h5", "frames.xdmf", "timeline.h5", "walls.xdmf"}));
 }
 
 TEST(Pour, AccountsForAllMassAtEveryFrame) {
@@ -127,8 +124,7 @@ TEST(Pour, FollowsPathsOverARimHoweverFewFramesThereAre) {
     scene.schedule.substeps_per_frame = 300 / frames;
     Leaping over(0.3), through(0);
     EXPECT_FALSE(pour(scene, over, quiet_options(folder / "over")).summary.penetrated()) << frames;
-    EXPECT_TRUE(pour(scene, through, quiet_options(folder / "through")).summary.penetrated())
-        << frames;
+    EXPECT_TRUE(pour(scene, through, quiet_options(folder / "through")).summary.penetrated()) << frames;
   }
 }
 
@@ -300,8 +296,7 @@ TEST(Pour, WritesCsvFramesBesideTheOthers) {
   PourOptions options = quiet_options(folder / "out");
   options.csv = true;
   pour(scene, backend, options);
-  for (const char* name :
-       {"fluid_000000.csv", "fluid_000003.csv", "boundary_000003.csv", "boundary_static.csv"})
+  for (const char* name : {"fluid_000000.csv", "fluid_000003.csv", "boundary_000003.csv", "boundary_static.csv"})
     EXPECT_TRUE(fs::exists(folder / "out/csv" / name)) << name;
 }
 

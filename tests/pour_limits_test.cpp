@@ -81,8 +81,7 @@ Scene tearing_scene() {
   scene.fluid.allow_tension = true;
   scene.fluid.viscosity = scene.fluid.wall_viscosity = 0;
   scene.domain = {Vec3::Constant(-0.2), Vec3::Constant(0.2), {}};
-  scene.containers.push_back(
-      {"cup", cup_shape(0.02, 0.05, 0.009), Vec3(-0.03, 0, 0.02), 0.009, {}});
+  scene.containers.push_back({"cup", cup_shape(0.02, 0.05, 0.009), Vec3(-0.03, 0, 0.02), 0.009, {}});
   Fill water;
   water.container = "cup";
   water.level = 0.03;
@@ -118,8 +117,7 @@ TEST(Limits, ThatAPourPassesAreInItsSummaryAndInItsJson) {
   EXPECT_EQ(json.at("limits_exceeded").size(), 3u);
   EXPECT_EQ(json.at("limits_exceeded")[1].at("limit").get<std::string>(), "sound_speed_quarter");
   EXPECT_EQ(json.at("limits_exceeded")[1].at("bound").get<double>(), 10 / 4.0);
-  EXPECT_EQ(json.at("limits_exceeded")[1].at("particle").get<std::int64_t>(),
-            result.limits_exceeded[1].particle);
+  EXPECT_EQ(json.at("limits_exceeded")[1].at("particle").get<std::int64_t>(), result.limits_exceeded[1].particle);
 }
 
 TEST(Limits, ThatHoldAreNotComplainedOf) {
@@ -131,8 +129,7 @@ TEST(Limits, ThatHoldAreNotComplainedOf) {
   options.quiet = true;
   const PourResult result = pour(scene, backend, options);
   EXPECT_TRUE(result.limits_exceeded.empty());
-  EXPECT_EQ(nlohmann::json::parse(pour_json(result, backend.info(), "out")).at("within_limits"),
-            true);
+  EXPECT_EQ(nlohmann::json::parse(pour_json(result, backend.info(), "out")).at("within_limits"), true);
 }
 
 TEST(ExpectedSpeed, IsThatOfTheFastestWallWhateverItHolds) {

@@ -73,8 +73,7 @@ double seconds_of(const std::function<void()>& work) {
 }
 
 void wait_for(const fs::path& file) {
-  for (int k = 0; k < 1000 && !fs::exists(file); ++k)
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  for (int k = 0; k < 1000 && !fs::exists(file); ++k) std::this_thread::sleep_for(std::chrono::milliseconds(20));
   ASSERT_TRUE(fs::exists(file));
 }
 
@@ -113,8 +112,7 @@ TEST(TwoPours, IntoOneFolderLeaveTheFilesOfTheOneThatWasFirst) {
     ASSERT_EQ(std::minmax(first_status, second_status), std::minmax(0, int{exit_bad_input}));
     const bool is_one = (first_status == 0) != swapped;
     for (const char* file : {"frames.h5", "frames.xdmf", "csv/fluid_000003.csv"})
-      EXPECT_TRUE(bytes_of(folder / out / file) == bytes_of(folder / (is_one ? "one" : "other") / file))
-          << file;
+      EXPECT_TRUE(bytes_of(folder / out / file) == bytes_of(folder / (is_one ? "one" : "other") / file)) << file;
     EXPECT_FALSE(fs::exists(folder / out / "csv/fluid_000007.csv"));
   }
 }
@@ -229,8 +227,7 @@ TEST(StoppedPour, LeavesACallThatTakesLongAndLosesNothingBeforeIt) {
 TEST(StoppedPour, EndsAtOnceWhenToldTwice) {
   for (const int second : {SIGTERM, SIGINT}) {
     const TemporaryFolder folder;
-    const Process stuck(
-        [&] { return stuck_pour(test::falling_points_scene(), folder / "out", 35); });
+    const Process stuck([&] { return stuck_pour(test::falling_points_scene(), folder / "out", 35); });
     wait_for(folder / "out.stuck");
     stuck.signal(SIGINT);
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
@@ -249,9 +246,9 @@ TEST(StoppedPour, StopsInsideAFrameAndGoesOnThereToTheSameBits) {
   for (const char* backend : {"reference", "hash", "list"}) {
     const std::string out = folder / backend;
     const auto run = [&](bool resume) {
-      std::vector<std::string> all = {file,         "--out",     out,    "--backend",
-                                      backend,      "--quiet",   "--executor",
-                                      std::string(backend) == "reference" ? "auto" : "host"};
+      std::vector<std::string> all = {
+          file,    "--out",   out,          "--backend",
+          backend, "--quiet", "--executor", std::string(backend) == "reference" ? "auto" : "host"};
       if (resume) all.push_back("--resume");
       return Process([all] { return pour_command(all); });
     };
@@ -296,11 +293,9 @@ TEST(StoppedPour, InsideAFrameIsResumedToTheSameBitsAndTheSameTimeline) {
       options.stop = {};
       options.resume = true;
       EXPECT_TRUE(pour(scene, *backend(), options).finished);
-      EXPECT_TRUE(bytes_of(options.out / "frames.h5") ==
-                  bytes_of(folder / name / "whole/frames.h5"))
+      EXPECT_TRUE(bytes_of(options.out / "frames.h5") == bytes_of(folder / name / "whole/frames.h5"))
           << name << ", " << stretches;
-      const Hdf5Reader one(options.out / "timeline.h5"),
-          other(folder / name / "whole/timeline.h5");
+      const Hdf5Reader one(options.out / "timeline.h5"), other(folder / name / "whole/timeline.h5");
       for (const char* column : {"/max_speed", "/deepest", "/kinetic_energy", "/max_density"})
         EXPECT_EQ(one.vector(column), other.vector(column)) << column;
       for (const char* column : {"/crossed", "/fastest_particle", "/densest_particle"})

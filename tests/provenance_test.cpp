@@ -28,8 +28,7 @@ std::vector<fs::path> committed(const std::string& extension) {
 
 /// The abbreviated name of a commit and nothing else: no "-dirty", no "unknown".
 bool is_revision(const std::string& text) {
-  return text.size() >= 7 && text.size() <= 40 &&
-         std::all_of(text.begin(), text.end(), [](unsigned char c) {
+  return text.size() >= 7 && text.size() <= 40 && std::all_of(text.begin(), text.end(), [](unsigned char c) {
            return std::isdigit(c) || (c >= 'a' && c <= 'f');
          });
 }

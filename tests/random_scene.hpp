@@ -15,9 +15,7 @@ namespace decant::test {
 /// the open. The same seed gives the same fixture (without recorded fields, and without a file).
 inline Fixture random_fixture(std::uint32_t seed) {
   std::mt19937 random(seed);
-  const auto real = [&](double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(random);
-  };
+  const auto real = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
   const auto chance = [&](double p) { return real(0, 1) < p; };
   const auto pick = [&](int n) { return std::uniform_int_distribution<int>(0, n - 1)(random); };
 
@@ -81,8 +79,7 @@ inline Fixture random_fixture(std::uint32_t seed) {
     Vec3 amplitude = dx * Vec3(real(-0.5, 0.5), real(-0.5, 0.5), real(-0.5, 0.5));
     for (int a = 0; a < 3; ++a)
       if (scene.domain.periodic[static_cast<std::size_t>(a)]) amplitude[a] = 0;
-    scene.containers[0].translation.emplace().oscillation = {amplitude, real(0.1, 0.5) / dx,
-                                                            real(0, 6)};
+    scene.containers[0].translation.emplace().oscillation = {amplitude, real(0.1, 0.5) / dx, real(0, 6)};
   }
   return f;
 }

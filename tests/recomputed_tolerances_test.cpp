@@ -20,16 +20,15 @@ int status_of(const Fixture& fixture) {
   test::Edit edit;
   edit.evaluated = [](const Scene&, Fields& f) {
     for (auto* values : {&f.boundary_volume, &f.density, &f.pressure}) values->setConstant(1e30);
-    for (auto* values : {&f.pressure_acceleration, &f.viscous_acceleration,
-                         &f.wall_pressure_acceleration, &f.wall_viscous_acceleration, &f.acceleration})
+    for (auto* values : {&f.pressure_acceleration, &f.viscous_acceleration, &f.wall_pressure_acceleration,
+                         &f.wall_viscous_acceleration, &f.acceleration})
       values->setConstant(1e30);
   };
   test::EditedReference backend(edit);
   Report report;
   report.rows = judge(backend, fixture, oracle, {"fields"});
   write_report(file, report);
-  return test::run_python(
-      {DECANT_SOURCE_DIR "/tests/recompute_tolerances.py", inputs.string(), file.string()});
+  return test::run_python({DECANT_SOURCE_DIR "/tests/recompute_tolerances.py", inputs.string(), file.string()});
 }
 
 class RecomputedTolerances : public testing::Test {
@@ -39,9 +38,7 @@ class RecomputedTolerances : public testing::Test {
   }
 };
 
-TEST_F(RecomputedTolerances, FollowFromTheDocumentsInATiltingCup) {
-  EXPECT_EQ(status_of(test::answered_fixture()), 0);
-}
+TEST_F(RecomputedTolerances, FollowFromTheDocumentsInATiltingCup) { EXPECT_EQ(status_of(test::answered_fixture()), 0); }
 
 /// Of every kernel, on a period and free, in tanks at rest and tilting.
 TEST_F(RecomputedTolerances, FollowFromTheDocumentsOnRandomProblems) {
@@ -51,8 +48,7 @@ TEST_F(RecomputedTolerances, FollowFromTheDocumentsOnRandomProblems) {
     const Fixture f = test::random_form_case(seed);
     const Scene& s = f.scene;
     const auto& axes = s.domain.periodic;
-    const bool period = axes[0] || axes[1] || axes[2],
-               tilt = !s.containers.empty() && s.containers[0].tilt.has_value();
+    const bool period = axes[0] || axes[1] || axes[2], tilt = !s.containers.empty() && s.containers[0].tilt.has_value();
     const bool walls = !s.containers.empty();
     const bool wanted = (walls && !kernels.count(s.kernel)) || (period && !periodic) || (tilt && !tilting);
     if (!wanted || f.state.size() < 20 || s.fluid.viscosity == 0) continue;

@@ -68,8 +68,7 @@ std::vector<CheckRow> judged(const Edit& edit) {
   return judge(backend, recorded(), oracle(), {"fields"});
 }
 
-const CheckRow& row_of(const std::vector<CheckRow>& rows, std::string_view check,
-                       std::string_view field) {
+const CheckRow& row_of(const std::vector<CheckRow>& rows, std::string_view check, std::string_view field) {
   for (const CheckRow& row : rows)
     if (row.check == check && row.field == field) return row;
   throw std::logic_error("no row " + std::string(check) + " " + std::string(field));
@@ -94,26 +93,21 @@ TEST(FailingRow, TellsValuePlaceAndNeighborsOfItsWorstParticle) {
   double last = 0;
   int named = 0;
   for (Eigen::Index id; ids >> id; ++named) {
-    const double distance =
-        (recorded().state.position.col(id) - recorded().state.position.col(i)).norm();
+    const double distance = (recorded().state.position.col(id) - recorded().state.position.col(i)).norm();
     EXPECT_GT(distance, last);
     last = distance;
   }
   EXPECT_EQ(named, 8);
   std::int64_t closer = 0;
   for (Eigen::Index j = 0; j < recorded().state.size(); ++j)
-    closer += j != i &&
-              (recorded().state.position.col(j) - recorded().state.position.col(i)).norm() <= last;
+    closer += j != i && (recorded().state.position.col(j) - recorded().state.position.col(i)).norm() <= last;
   EXPECT_EQ(closer, 8);
   EXPECT_FALSE(is_located(row_of(rows, "pressure", "pressure")));
 
   const std::string text = std::regex_replace(in_full(row), std::regex("\n    "), " ");
   EXPECT_NE(text.find("particle 1234: error 10 kg/m^3"), std::string::npos) << text;
-  EXPECT_NE(text.find("got 1012.29368, expected 1002.29368 kg/m^3; at ("), std::string::npos)
-      << text;
-  EXPECT_NE(text.find("34 fluid neighbors, nearest " + row.nearest + "; 0 wall neighbors"),
-            std::string::npos)
-      << text;
+  EXPECT_NE(text.find("got 1012.29368, expected 1002.29368 kg/m^3; at ("), std::string::npos) << text;
+  EXPECT_NE(text.find("34 fluid neighbors, nearest " + row.nearest + "; 0 wall neighbors"), std::string::npos) << text;
 }
 
 TEST(FailingRow, OfAVectorNamesTheComponent) {
@@ -127,8 +121,8 @@ TEST(FailingRow, OfAVectorNamesTheComponent) {
 
 TEST(FailingRow, OfBoundaryVolumesIsAtAWallParticle) {
   const CheckRow row = row_of(judged(volumes_off()), "boundary_volume", "boundary_volume");
-  const PosedWalls posed = pose_walls(recorded().scene, oracle().walls,
-                                      recorded().scene.time_at(recorded().state.substep));
+  const PosedWalls posed =
+      pose_walls(recorded().scene, oracle().walls, recorded().scene.time_at(recorded().state.substep));
   EXPECT_EQ(Vec3(row.worst_x, row.worst_y, row.worst_z), posed.position.col(row.worst_id));
   EXPECT_NE(console_table({{row}, {}}).find("wall particle "), std::string::npos);
 }
@@ -139,8 +133,7 @@ TEST(FailingRow, OfAPermutedProblemNamesTheFixturesParticle) {
   edit.found = [](const Scene&, Neighbors& near, Eigen::VectorXd&) { near.fluid[0].clear(); };
   EditedReference backend(edit);
   const auto rows = judge(backend, recorded(), turned, {"invariance"});
-  EXPECT_EQ(row_of(rows, "invariance", "permuted density").worst_id,
-            turned.transformed.at(0).problem.original.at(0));
+  EXPECT_EQ(row_of(rows, "invariance", "permuted density").worst_id, turned.transformed.at(0).problem.original.at(0));
   EXPECT_EQ(row_of(rows, "invariance", "moved density").worst_id, 0);
 }
 
@@ -164,8 +157,7 @@ TEST_P(ReplayOf, KeepsTheParticlesBitsAndShowsTheFailureAgain) {
   EXPECT_EQ(is.density[cut.particle], was.density[row.worst_id]);
   EXPECT_EQ(is.pressure[cut.particle], was.pressure[row.worst_id]);
   EXPECT_EQ(Vec3(is.acceleration.col(cut.particle)), Vec3(was.acceleration.col(row.worst_id)));
-  const std::string here =
-      "particle " + std::to_string(row.worst_id) + ", here " + std::to_string(cut.particle);
+  const std::string here = "particle " + std::to_string(row.worst_id) + ", here " + std::to_string(cut.particle);
   EXPECT_EQ(replay.provenance.at("cut_around"), here);
   EXPECT_NE(line.find(here), std::string::npos) << line;
   EXPECT_EQ(replay.provenance.at("advanced_by"), recorded().provenance.at("advanced_by"));
@@ -178,8 +170,7 @@ TEST_P(ReplayOf, KeepsTheParticlesBitsAndShowsTheFailureAgain) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Faults, ReplayOf,
-                         testing::Values(std::tuple{"neighbors", "fluid_neighbor_count",
-                                                    &lists_cut_at_thirty},
+                         testing::Values(std::tuple{"neighbors", "fluid_neighbor_count", &lists_cut_at_thirty},
                                          std::tuple{"density", "density", &lists_cut_at_thirty},
                                          std::tuple{"acceleration", "viscous_acceleration",
                                                     &viscosity_off_by_a_percent}),
@@ -201,10 +192,8 @@ TEST(Replays, AreOneABackendAndFixtureOfTheFirstRowThatFailsAtAFluidParticle) {
     return r;
   };
   Report report;
-  report.rows = {row("brute", "trajectory", "energy", -1),
-                 row("brute", "boundary_volume", "boundary_volume", 5),
-                 row("brute", "invariance", "moved density", 6),
-                 row("brute", "density", "density", 7),
+  report.rows = {row("brute", "trajectory", "energy", -1), row("brute", "boundary_volume", "boundary_volume", 5),
+                 row("brute", "invariance", "moved density", 6), row("brute", "density", "density", 7),
                  row("hash", "boundary_volume", "boundary_volume", 8)};
   report.rows.push_back(row("hash", "density", "density", 9));
   report.rows.back().options = "sort=thrust:threads_per_particle=4";
@@ -213,18 +202,15 @@ TEST(Replays, AreOneABackendAndFixtureOfTheFirstRowThatFailsAtAFluidParticle) {
   report.rows.back().score = 0.5;
   std::vector<std::string> names;
   for (const Replay& replay : replays_of(report, "out")) names.push_back(replay.file.string());
-  EXPECT_EQ(names,
-            (std::vector<std::string>{"out/pour-brute-invariance-moved-density-6.h5",
-                                      "out/pour-hash-boundary_volume-boundary_volume-8.h5",
-                                      "out/pour-hash-sort-thrust-lanes-4-density-density-9.h5"}));
+  EXPECT_EQ(names, (std::vector<std::string>{"out/pour-brute-invariance-moved-density-6.h5",
+                                             "out/pour-hash-boundary_volume-boundary_volume-8.h5",
+                                             "out/pour-hash-sort-thrust-lanes-4-density-density-9.h5"}));
 }
 
 TEST(Surroundings, HoldFluidAndWallsWithinTheirRadiusWithTheRowsScores) {
-  const CheckRow row = row_of(judged(wall_viscosity_off_by_a_percent()), "acceleration",
-                              "wall_viscous_acceleration");
+  const CheckRow row = row_of(judged(wall_viscosity_off_by_a_percent()), "acceleration", "wall_viscous_acceleration");
   const double radius = 6 * recorded().scene.support_radius();
-  const Surroundings s =
-      surroundings_of(recorded(), oracle().walls, oracle().own.fields.density, row, 12, radius);
+  const Surroundings s = surroundings_of(recorded(), oracle().walls, oracle().own.fields.density, row, 12, radius);
   const Vec3 center(row.worst_x, row.worst_y, row.worst_z);
   int fluid = 0, worst = 0;
   for (Eigen::Index k = 0; k < s.position.cols(); ++k) {

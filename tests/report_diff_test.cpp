@@ -43,8 +43,7 @@ CheckRow not_run(const std::string& check) {
 }
 
 TEST(ReportDiff, OfAReportFromItselfIsEmpty) {
-  const Report report{{row("density", 0.5), row("pressure", nan), not_run("substep")},
-                      {{"version", "1"}}};
+  const Report report{{row("density", 0.5), row("pressure", nan), not_run("substep")}, {{"version", "1"}}};
   const ReportDiff diff = difference(report, report);
   EXPECT_FALSE(diff.got_worse());
   EXPECT_EQ(diff_text(diff), "3 rows in both: nothing moved: no worse\n");
@@ -54,8 +53,8 @@ TEST(ReportDiff, GetsWorseWhereAPassDoesNotStayOne) {
   const Report good{{row("density", 0.5)}, {}};
   CheckRow lie = row("density", 0.5);
   lie.score = nan;
-  for (const Report& bad : {Report{{row("density", 31)}, {}}, Report{{not_run("density")}, {}},
-                            Report{{}, {}}, Report{{lie}, {}}}) {
+  for (const Report& bad :
+       {Report{{row("density", 31)}, {}}, Report{{not_run("density")}, {}}, Report{{}, {}}, Report{{lie}, {}}}) {
     EXPECT_TRUE(difference(good, bad).got_worse());
     EXPECT_TRUE(diff_text(difference(good, bad)).ends_with(": worse\n"));
     EXPECT_FALSE(difference(bad, good).got_worse());
@@ -65,8 +64,8 @@ TEST(ReportDiff, GetsWorseWhereAPassDoesNotStayOne) {
 TEST(ReportDiff, RowsAreTheSameWhereBackendOptionsExecutorFixtureCheckAndFieldAre) {
   const CheckRow base = row("density", 0.5);
   EXPECT_EQ(difference({{base}, {}}, {{base}, {}}).compared, 1u);
-  for (auto member : {&CheckRow::backend, &CheckRow::options, &CheckRow::executor,
-                      &CheckRow::fixture, &CheckRow::check, &CheckRow::field}) {
+  for (auto member : {&CheckRow::backend, &CheckRow::options, &CheckRow::executor, &CheckRow::fixture, &CheckRow::check,
+                      &CheckRow::field}) {
     CheckRow other = base;
     other.*member += "x";
     const ReportDiff diff = difference({{base}, {}}, {{other}, {}});
@@ -96,8 +95,7 @@ TEST(ReportDiff, AFailingRowThatIsGoneIsToldAndIsNoWorse) {
 
 TEST(ReportDiff, ScoresMoveWhereTheyLeaveTheFactor) {
   const auto moved = [](double a, double b, double factor) {
-    const ReportDiff diff =
-        difference({{row("density", a)}, {}}, {{row("density", b)}, {}}, factor);
+    const ReportDiff diff = difference({{row("density", a)}, {}}, {{row("density", b)}, {}}, factor);
     return static_cast<int>(diff.grown.size()) - static_cast<int>(diff.shrunk.size());
   };
   EXPECT_EQ(moved(0.25, 0.5, 2), 0);
@@ -138,8 +136,8 @@ TEST(ReportDiff, TheTextStaysWithinAHundredColumns) {
   CheckRow bad = long_row;
   bad.score = 1e9;
   bad.verdict = Verdict::fail;
-  std::istringstream lines(diff_text(
-      difference({{long_row, row("a", 1)}, {{"k", std::string(300, 'v')}}}, {{bad}, {}})));
+  std::istringstream lines(
+      diff_text(difference({{long_row, row("a", 1)}, {{"k", std::string(300, 'v')}}}, {{bad}, {}})));
   for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 100u) << line;
 }
 

@@ -72,9 +72,7 @@ class ReportPage : public testing::Test {
     if (!test::python_has("h5py, matplotlib"))
       GTEST_SKIP() << "no matplotlib in " << test::python() << "; ci/setup makes it";
   }
-  int run() {
-    return test::run_python({DECANT_SOURCE_DIR "/tools/report_html.py", (folder_ / "report.h5").string()});
-  }
+  int run() { return test::run_python({DECANT_SOURCE_DIR "/tools/report_html.py", (folder_ / "report.h5").string()}); }
   std::string page() {
     std::ifstream in(folder_ / "report.html");
     return {std::istreambuf_iterator<char>(in), {}};
@@ -86,12 +84,11 @@ TEST_F(ReportPage, NamesEveryFixtureAndFailureAndNeedsNothingFromElsewhere) {
   write_report(folder_ / "report.h5", failing_report());
   ASSERT_EQ(run(), 0);
   const std::string html = page();
-  for (const char* part : {"pour-4k-rest", "pour-4k-stream", "pour-&lt;56k&gt;", "pour-4k-splash",
-                           "1003.25", "1000.5", "4 9 2", "no device", "&lt;host &amp; more&gt;"})
+  for (const char* part : {"pour-4k-rest", "pour-4k-stream", "pour-&lt;56k&gt;", "pour-4k-splash", "1003.25", "1000.5",
+                           "4 9 2", "no device", "&lt;host &amp; more&gt;"})
     EXPECT_NE(html.find(part), std::string::npos) << part;
   std::size_t pictures = 0;
-  for (auto at = html.find("<svg"); at != std::string::npos; at = html.find("<svg", at + 1))
-    ++pictures;
+  for (auto at = html.find("<svg"); at != std::string::npos; at = html.find("<svg", at + 1)) ++pictures;
   EXPECT_EQ(pictures, 3u);  // distribution, three ways, slice
   EXPECT_EQ(html.find("<56k>"), std::string::npos);
   EXPECT_FALSE(std::regex_search(html, std::regex("https?:|//|@import|<link|<script|\\ssrc=")));

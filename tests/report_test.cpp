@@ -19,8 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-CheckRow row(const std::string& backend, const std::string& fixture, const std::string& check,
-             double score) {
+CheckRow row(const std::string& backend, const std::string& fixture, const std::string& check, double score) {
   CheckRow r;
   r.backend = backend;
   r.executor = "host";
@@ -78,8 +77,7 @@ TEST_F(ReportFile, TheSummarysColumnsAreOfEqualLength) {
   EXPECT_EQ(in.integer_attribute("/", "decant_report"), 2);
   const auto columns = in.children("/summary");
   EXPECT_EQ(columns.size(), 10u + 1 + 6 + 10 + 9);
-  for (const auto& column : columns)
-    EXPECT_EQ(in.shape("/summary/" + column), std::vector<std::int64_t>{7}) << column;
+  for (const auto& column : columns) EXPECT_EQ(in.shape("/summary/" + column), std::vector<std::int64_t>{7}) << column;
 }
 
 TEST_F(ReportFile, RowsAndProvenanceComeBack) {
@@ -244,13 +242,11 @@ TEST(ReportVerdict, TheExitStatusIsZeroOnlyWhereEverythingPassed) {
 }
 
 TEST(ReportTable, ShowsWorstScoreAndEndsInOneLine) {
-  const Report report{{row("brute", "pour-4k-stream", "density", 0.25),
-                       row("brute", "pour-4k-stream", "pressure", 0.5),
+  const Report report{{row("brute", "pour-4k-stream", "density", 0.25), row("brute", "pour-4k-stream", "pressure", 0.5),
                        row("brute", "pour-4k-rest", "density", 0.1)},
                       {}};
   const std::string table = console_table(report);
-  EXPECT_NE(table.find("pour-4k-stream  pass             0.5  pressure\n"), std::string::npos)
-      << table;
+  EXPECT_NE(table.find("pour-4k-stream  pass             0.5  pressure\n"), std::string::npos) << table;
   EXPECT_TRUE(table.ends_with("\n2 fixtures × 1 backend: pass\n")) << table;
 }
 
@@ -264,18 +260,15 @@ TEST(ReportTable, ShowsEveryFailingRowInFull) {
             std::string::npos)
       << table;
   EXPECT_NE(table.find("fail: hash host on pour: pressure"), std::string::npos);
-  EXPECT_NE(table.find("not_run: list cuda on pour: all\n    no CUDA device\n"), std::string::npos)
-      << table;
-  EXPECT_TRUE(table.ends_with("1 fixture × 3 backends: fail (1 of 3 fail, 1 of 3 not run)\n"))
-      << table;
+  EXPECT_NE(table.find("not_run: list cuda on pour: all\n    no CUDA device\n"), std::string::npos) << table;
+  EXPECT_TRUE(table.ends_with("1 fixture × 3 backends: fail (1 of 3 fail, 1 of 3 not run)\n")) << table;
 }
 
 TEST(ReportTable, ANanScoreIsTheWorstAndReadsAsFail) {
   CheckRow lie = row("brute", "pour", "pressure", 0.5);
   lie.score = nan;
-  const std::string table = console_table(
-      {{row("brute", "pour", "density", 0.25), lie, row("brute", "pour", "acceleration", 0.75)},
-       {}});
+  const std::string table =
+      console_table({{row("brute", "pour", "density", 0.25), lie, row("brute", "pour", "acceleration", 0.75)}, {}});
   EXPECT_NE(table.find("fail             nan  pressure"), std::string::npos) << table;
   EXPECT_TRUE(table.ends_with("fail (1 of 1 fail)\n")) << table;
 }
@@ -299,9 +292,7 @@ TEST(ReportTable, StaysWithinAHundredColumns) {
   for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 100u) << line;
 }
 
-TEST(ReportTable, NothingJudgedIsNotAPass) {
-  EXPECT_EQ(verdict_line({}), "nothing was judged: not_run");
-}
+TEST(ReportTable, NothingJudgedIsNotAPass) { EXPECT_EQ(verdict_line({}), "nothing was judged: not_run"); }
 
 }  // namespace
 }  // namespace decant

@@ -21,8 +21,7 @@ namespace decant::test {
 inline Fixture answered_fixture() {
   Fixture f = small_fixture();
   f.scene.containers[0].tilt = Tilt{Vec3(0.05, 0, 0.1), Vec3::UnitY(), {{0.0, 0.0}, {1.0, 1.2}}};
-  f.state.position += 0.1 * f.scene.particle_spacing *
-                      Eigen::Matrix3Xd::Random(3, f.state.size());
+  f.state.position += 0.1 * f.scene.particle_spacing * Eigen::Matrix3Xd::Random(3, f.state.size());
   f.state.velocity *= 0.1;
   f.state.quantise();
   evaluate_oracle(f.scene, f.state, *f.fields, *f.condition);
@@ -35,8 +34,7 @@ class ResultsFile : public testing::Test {
     folder_ = std::make_unique<TemporaryFolder>();
     write_fixture(fixture_file(), answered_fixture());
     fixture_ = std::make_unique<Fixture>(read_fixture(fixture_file()));
-    oracle_ = std::make_unique<Judgement>(
-        prepare(*fixture_, {"fields", "substep", "conservation"}));
+    oracle_ = std::make_unique<Judgement>(prepare(*fixture_, {"fields", "substep", "conservation"}));
   }
   static void TearDownTestSuite() {
     oracle_.reset();
@@ -56,9 +54,7 @@ class ResultsFile : public testing::Test {
     fill(out);
     out.commit();
   }
-  static ResultsOutcome judged() {
-    return judge_results_file({results_file(), {fixture_file()}, "", "port", {}});
-  }
+  static ResultsOutcome judged() { return judge_results_file({results_file(), {fixture_file()}, "", "port", {}}); }
   /// Asserts that the command refuses the files, naming this key.
   static void expect_refused(const std::function<ResultsOutcome()>& judge, const std::string& key) {
     try {
@@ -68,8 +64,7 @@ class ResultsFile : public testing::Test {
       EXPECT_EQ(error.key(), key) << error.what();
     }
   }
-  static const CheckRow& row_of(const ResultsOutcome& outcome, const std::string& check,
-                                const std::string& field) {
+  static const CheckRow& row_of(const ResultsOutcome& outcome, const std::string& check, const std::string& field) {
     for (const CheckRow& row : outcome.report.rows)
       if (row.check == check && row.field == field) return row;
     throw std::runtime_error("no row " + check + " / " + field);

@@ -31,8 +31,7 @@ TEST_F(FixtureResults, AreJudgedAsALinkedBackendIs) {
   write([&](Hdf5Writer& out) {
     for (const auto& field : stage_fields)
       out.vector(std::string("/fields/") + field.name, own.*field.member, field.unit);
-    for (const auto& fact : neighbor_facts)
-      out.integers(std::string("/fields/") + fact.name, own.*fact.member);
+    for (const auto& fact : neighbor_facts) out.integers(std::string("/fields/") + fact.name, own.*fact.member);
     for (const auto& field : acceleration_fields) {
       out.matrix3(std::string("/fields/") + field.name, own.*field.member, "m/s^2");
       out.matrix3(std::string("/staged/") + field.name, staged.*field.member, "m/s^2");
@@ -110,9 +109,8 @@ TEST_F(FixtureResults, OfAnotherFixtureAreRefused) {
   expect_refused(judged, "/@fixture_sha256");
   declaring("");
   expect_refused(judged, "/@fixture_sha256");
-  write([&](Hdf5Writer& out) {
-    out.attribute("/", "particles", static_cast<std::int64_t>(fixture_->state.size() + 1));
-  });
+  write(
+      [&](Hdf5Writer& out) { out.attribute("/", "particles", static_cast<std::int64_t>(fixture_->state.size() + 1)); });
   expect_refused(judged, "/@particles");
 }
 
@@ -130,9 +128,7 @@ TEST_F(FixtureResults, OfAnotherShapeTypeUnitOrNameAreRefused) {
   const Eigen::Index n = density.size();
   write([&](Hdf5Writer& out) { put_density(out, density.head(n - 1)); });
   expect_refused(judged, "/fields/density");
-  write([&](Hdf5Writer& out) {
-    out.matrix3("/fields/density", Eigen::Matrix3Xd::Zero(3, n), "kg/m^3");
-  });
+  write([&](Hdf5Writer& out) { out.matrix3("/fields/density", Eigen::Matrix3Xd::Zero(3, n), "kg/m^3"); });
   expect_refused(judged, "/fields/density");
   write([&](Hdf5Writer& out) { out.vector("/fields/wall_neighbor_count", density, ""); });
   expect_refused(judged, "/fields/wall_neighbor_count");
@@ -170,8 +166,7 @@ TEST_F(FixtureResults, FailByNameWhereIdsAreMissingOrDoubled) {
   EXPECT_EQ(row_of(outcome, "ids", "id").verdict, Verdict::fail);
   EXPECT_EQ(row_of(outcome, "ids", "id").reason, "id 5 is missing, id 6 is there 2 times");
   EXPECT_EQ(row_of(outcome, "density", "density").verdict, Verdict::not_run);
-  EXPECT_EQ(row_of(outcome, "boundary_volume", "boundary_volume").verdict, Verdict::pass)
-      << "walls have no part in it";
+  EXPECT_EQ(row_of(outcome, "boundary_volume", "boundary_volume").verdict, Verdict::pass) << "walls have no part in it";
 
   write([&](Hdf5Writer& out) {
     put_density(out, density.head(n - 2));
@@ -185,9 +180,7 @@ TEST_F(FixtureResults, FailByNameWhereIdsAreMissingOrDoubled) {
 TEST_F(FixtureResults, NeedOneFixtureAndChecksThatAFileCanAnswer) {
   write([](Hdf5Writer&) {});
   expect_refused([] { return judge_results_file({results_file(), {}, "", "", {}}); }, "FIXTURE");
-  expect_refused(
-      [] { return judge_results_file({results_file(), {fixture_file()}, "", "", {"mass"}}); },
-      "--check");
+  expect_refused([] { return judge_results_file({results_file(), {fixture_file()}, "", "", {"mass"}}); }, "--check");
 }
 
 }  // namespace

@@ -37,9 +37,7 @@ class Resume : public testing::TestWithParam<Choice> {
     std::string why_not;
     if (!executor_available(GetParam().executor, &why_not)) GTEST_SKIP() << why_not;
   }
-  std::unique_ptr<Backend> make() const {
-    return test::make_variant(GetParam().name, GetParam().executor);
-  }
+  std::unique_ptr<Backend> make() const { return test::make_variant(GetParam().name, GetParam().executor); }
 
   /// `frames` advances of `substeps`, fields looked at after each as a pour does; another backend that is
   /// given the state before an advance must come to the same state and the same fields.
@@ -105,9 +103,8 @@ TEST_P(Resume, EndsInTheSameBitsInTheStream) {
   expect_same_bits(f.scene, f.state, 2, f.scene.schedule.substeps_per_frame);
 }
 
-INSTANTIATE_TEST_SUITE_P(Backends, Resume, testing::ValuesIn(choices()), [](const auto& chosen) {
-  return test::plain_name(chosen.param.name, chosen.param.executor);
-});
+INSTANTIATE_TEST_SUITE_P(Backends, Resume, testing::ValuesIn(choices()),
+                         [](const auto& chosen) { return test::plain_name(chosen.param.name, chosen.param.executor); });
 
 }  // namespace
 }  // namespace decant

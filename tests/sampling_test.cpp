@@ -22,8 +22,7 @@ constexpr double radius = 0.05, height = 0.1, thickness = 0.04;  // m, the cup
 Scene cup_scene(double level) {
   Scene scene = open_scene();
   scene.particle_spacing = 0.005;
-  scene.containers = {
-      {"cup", cup_shape(radius, height, thickness), Vec3(0.2, 0, 0.1), thickness, {}}};
+  scene.containers = {{"cup", cup_shape(radius, height, thickness), Vec3(0.2, 0, 0.1), thickness, {}}};
   scene.fills = {{"cup", level, {}, Vec3(1, 2, 3)}};
   return scene;
 }
@@ -32,11 +31,8 @@ Scene cup_scene(double level) {
 Scene tank_scene() {
   Scene scene = open_scene();
   const double dx = scene.particle_spacing = 1.0 / 64;
-  scene.containers = {{"tank",
-                       tank_shape(dx * Vec3(10, 6, 8), 6 * dx, {{{}, {}, {false, true}}}),
-                       Vec3(0.25, 0.5, 0),
-                       6 * dx,
-                       {}}};
+  scene.containers = {
+      {"tank", tank_shape(dx * Vec3(10, 6, 8), 6 * dx, {{{}, {}, {false, true}}}), Vec3(0.25, 0.5, 0), 6 * dx, {}}};
   scene.fills = {{"tank", 5.5 * dx, {}, Vec3::Zero()}};
   return scene;
 }
@@ -46,8 +42,7 @@ Scene slab_scene(int layers, KernelFamily family) {
   Scene scene = open_scene(family);
   const double dx = scene.particle_spacing = 1.0 / 64;
   scene.domain = {Vec3(0, 0, -1), Vec3(8 * dx, 8 * dx, 1), {true, true, false}};
-  BoxShape slab =
-      tank_shape(dx * Vec3(8, 8, 4), layers * dx, {{{true, true}, {true, true}, {false, true}}});
+  BoxShape slab = tank_shape(dx * Vec3(8, 8, 4), layers * dx, {{{true, true}, {true, true}, {false, true}}});
   slab.endless = {true, true, false};
   scene.containers = {{"slab", slab, Vec3::Zero(), layers * dx, {}}};
   scene.wall_layers = (layers + 1) / 2;  // counted from either face, so that the slab is full
@@ -131,12 +126,13 @@ TEST(Walls, StayInsideASolidThatIsThinnerThanTheirLayers) {
     for (const double edge : {0.3, 0.6, 1.5}) {
       const double dx = scene.particle_spacing, high = thickness_in_dx * dx;
       Container& ring = scene.containers[0];
-      ring.shape = RevolvedShape{
-          {{1.2 * dx, 0}, {6 * dx, 0}, {6 * dx, high}, {1.5 * dx, high}, {edge * dx, 0.5 * high}}};
+      ring.shape =
+          RevolvedShape{{{1.2 * dx, 0}, {6 * dx, 0}, {6 * dx, high}, {1.5 * dx, high}, {edge * dx, 0.5 * high}}};
       const Eigen::Matrix3Xd wall = sample_walls(scene).containers[0].position;
       EXPECT_GT(wall.cols(), 0);
       for (const auto& x : wall.colwise())
-        EXPECT_LT(signed_distance(ring, x).distance, -0.49 * dx) << thickness_in_dx << ' ' << edge << ": " << x.transpose();
+        EXPECT_LT(signed_distance(ring, x).distance, -0.49 * dx)
+            << thickness_in_dx << ' ' << edge << ": " << x.transpose();
     }
 }
 
@@ -170,8 +166,7 @@ TEST(TankWalls, AreTheLatticeCellsOfTheSolidThatAreFewLayersDeep) {
           if (solid({i, j, k}) && near_the_surface({i, j, k}))
             expected.push_back({(i + 0.5) * dx, (j + 0.5) * dx, (k + 0.5) * dx});
     const Walls walls = sample_walls(scene);
-    for (const auto& x : walls.containers[0].position.colwise())
-      found.push_back({x.x(), x.y(), x.z()});
+    for (const auto& x : walls.containers[0].position.colwise()) found.push_back({x.x(), x.y(), x.z()});
     std::sort(found.begin(), found.end());
     EXPECT_EQ(found, expected) << layers << " layers";
   }
@@ -179,16 +174,14 @@ TEST(TankWalls, AreTheLatticeCellsOfTheSolidThatAreFewLayersDeep) {
 
 TEST(RenderSurface, LiesOnTheSolidAndHasItsArea) {
   const double outer = radius + thickness;
-  const double cup_area =
-      2 * pi * outer * outer + 2 * pi * outer * (height + thickness) + 2 * pi * radius * height;
+  const double cup_area = 2 * pi * outer * outer + 2 * pi * outer * (height + thickness) + 2 * pi * radius * height;
   const double dx = 1.0 / 64;  // outside and top of the tank's 22 × 18 × 14 block, and its cavity
   const double tank_area = dx * dx * (2 * (22 * 14 + 18 * 14 + 22 * 18) + 2 * (10 * 8 + 6 * 8));
   const std::pair<Container, double> cases[] = {{cup_scene(0.06).containers[0], cup_area},
                                                 {tank_scene().containers[0], tank_area}};
   for (const auto& [container, expected] : cases) {
     const RenderSurface surface = render_surface(container, 0.002);
-    for (const auto& x : surface.vertex.colwise())
-      EXPECT_NEAR(signed_distance(container, x).distance, 0, 1e-15);
+    for (const auto& x : surface.vertex.colwise()) EXPECT_NEAR(signed_distance(container, x).distance, 0, 1e-15);
     double area = 0;
     for (const auto& [a, b, c] : surface.triangle) {
       const Vec3 x = surface.vertex.col(a), y = surface.vertex.col(b), z = surface.vertex.col(c);
@@ -237,8 +230,8 @@ TEST(CupFill, HasTheVolumeUpToTheLevel) {
     const Scene scene = cup_scene(level);
     const double dx = scene.particle_spacing;
     const double layers = std::floor(level / dx + 1e-6);
-    const double volume = static_cast<double>(initial_state(scene).size()) * scene.particle_mass() /
-                          scene.fluid.rest_density;
+    const double volume =
+        static_cast<double>(initial_state(scene).size()) * scene.particle_mass() / scene.fluid.rest_density;
     // A layer holds the cells whose centre is dx/2 from the wall; a cell reaches dx/√2 about it.
     const double least = radius - 0.5 * dx - dx / std::sqrt(2), most = least + dx * std::sqrt(2);
     EXPECT_GT(volume, layers * dx * pi * least * least) << level;
@@ -271,8 +264,7 @@ TEST(TankFill, RunsAlongXFirstAndStopsBelowTheLevel) {
   for (int k = 0; k < 5; ++k)
     for (int j = 0; j < 6; ++j)
       for (int i = 0; i < 10; ++i)
-        EXPECT_EQ(Vec3(state.position.col(n++)),
-                  scene.containers[0].origin + dx * Vec3(i + 0.5, j + 0.5, k + 0.5));
+        EXPECT_EQ(Vec3(state.position.col(n++)), scene.containers[0].origin + dx * Vec3(i + 0.5, j + 0.5, k + 0.5));
 }
 
 TEST(BoxFill, StandsInTheWorldOrInItsContainersFrame) {
@@ -302,8 +294,7 @@ TEST(RoundFill, LiesEvenlyAboutItsCenter) {
   Eigen::Index expected = 0;
   for (int k = -4; k < 4; ++k)
     for (int j = -4; j < 4; ++j)
-      for (int i = -4; i < 4; ++i)
-        expected += Vec3(i + 0.5, j + 0.5, k + 0.5).norm() <= 2.7;
+      for (int i = -4; i < 4; ++i) expected += Vec3(i + 0.5, j + 0.5, k + 0.5).norm() <= 2.7;
   EXPECT_EQ(state.size(), expected);
 }
 
@@ -320,8 +311,8 @@ TEST(RoundFill, ARodAsLongAsThePeriodGoesOnAcrossIt) {
   EXPECT_EQ(state.size() % 6, 0);
   EXPECT_NEAR(state.position.row(1).minCoeff(), 0.5 * dx, 1e-8);
   EXPECT_NEAR(state.position.row(1).maxCoeff(), 5.5 * dx, 1e-8);
-  EXPECT_LE((state.position.row(0).array().square() + state.position.row(2).array().square())
-                .sqrt().maxCoeff(), 3.5 * dx * (1 + 1e-6));
+  EXPECT_LE((state.position.row(0).array().square() + state.position.row(2).array().square()).sqrt().maxCoeff(),
+            3.5 * dx * (1 + 1e-6));
 }
 
 TEST(Fill, VelocityFollowsItsGradientInTheWorld) {
@@ -343,16 +334,13 @@ TEST(CupFill, LeansWithACupThatStartsTilted) {
   const auto upright = initial_state(scene).position;
   scene.containers[0].tilt = Tilt{pivot, Vec3::UnitY(), {{0, 0.3}}};
   const Eigen::AngleAxisd turn(0.3, Vec3::UnitY());
-  const Eigen::Matrix3Xd expected =
-      (turn.toRotationMatrix() * (upright.colwise() - pivot)).colwise() + pivot;
+  const Eigen::Matrix3Xd expected = (turn.toRotationMatrix() * (upright.colwise() - pivot)).colwise() + pivot;
   const auto leaning = initial_state(scene).position;
   ASSERT_EQ(leaning.cols(), expected.cols());
   EXPECT_LT((leaning - expected).colwise().norm().maxCoeff(), 1e-7);
 }
 
-TEST(CupFill, IsRefusedWhereItHoldsNoParticle) {
-  EXPECT_THROW(initial_state(cup_scene(0.004)), std::runtime_error);
-}
+TEST(CupFill, IsRefusedWhereItHoldsNoParticle) { EXPECT_THROW(initial_state(cup_scene(0.004)), std::runtime_error); }
 
 }  // namespace
 }  // namespace decant::test

@@ -43,9 +43,7 @@ Scene channel() { return load_scene(scenes / "channel-periodic.json"); }
 Scene dam() { return load_scene(scenes / "dam-break.json"); }
 
 /// A cup or a peg, where a test needs one solid more.
-Container cup_at(const Vec3& origin) {
-  return {"third", cup_shape(0.02, 0.03, 0.009), origin, 0.009, {}};
-}
+Container cup_at(const Vec3& origin) { return {"third", cup_shape(0.02, 0.03, 0.009), origin, 0.009, {}}; }
 
 /// A blade of 12 × 20 × 30 mm from `origin` on.
 Container blade_at(const Vec3& origin) {
@@ -66,30 +64,28 @@ void PrintTo(const Unsound& scene, std::ostream* out) { *out << scene.what; }
 const double nan = std::numeric_limits<double>::quiet_NaN();
 
 const Unsound unsound[] = {
-    {"SpacingNotANumber", pour, [](Scene& s) { s.particle_spacing = nan; }, "particle_spacing",
-     "nan", "> 0"},
-    {"SupportBelowOneAndAHalf", pour, [](Scene& s) { s.support_ratio = 1.4; }, "support_ratio",
-     "1.4", ">= 1.5"},
-    {"DomainBeyondSinglePrecision", pour, [](Scene& s) { s.domain.max.x() = 100; }, "domain",
-     "100.0", "single precision"},
-    {"PeriodBelowThreeSupports", channel, [](Scene& s) { s.domain.max.y() = 0.005; },
-     "domain.periodic", "y", "a period >= 3 H = 0.006"},
-    {"TwoContainersOfOneName", pour, [](Scene& s) { s.containers[1].name = "source"; },
-     "containers[1].name", "source", "containers[0] has it already"},
+    {"SpacingNotANumber", pour, [](Scene& s) { s.particle_spacing = nan; }, "particle_spacing", "nan", "> 0"},
+    {"SupportBelowOneAndAHalf", pour, [](Scene& s) { s.support_ratio = 1.4; }, "support_ratio", "1.4", ">= 1.5"},
+    {"DomainBeyondSinglePrecision", pour, [](Scene& s) { s.domain.max.x() = 100; }, "domain", "100.0",
+     "single precision"},
+    {"PeriodBelowThreeSupports", channel, [](Scene& s) { s.domain.max.y() = 0.005; }, "domain.periodic", "y",
+     "a period >= 3 H = 0.006"},
+    {"TwoContainersOfOneName", pour, [](Scene& s) { s.containers[1].name = "source"; }, "containers[1].name", "source",
+     "containers[0] has it already"},
     {"WallThinnerThanSupport", pour, [](Scene& s) { s.containers[1].wall_thickness = 0.007; },
      "containers[1].wall_thickness", "0.007", ">= H = 0.0077"},
-    {"WallLayersLeaveTheSolid", pour, [](Scene& s) { s.wall_layers = 3; },
-     "containers[0].wall_thickness", "0.009", "wall_layers · dx = 0.01155"},
+    {"WallLayersLeaveTheSolid", pour, [](Scene& s) { s.wall_layers = 3; }, "containers[0].wall_thickness", "0.009",
+     "wall_layers · dx = 0.01155"},
     {"TiltKeysOutOfOrder", pour, [](Scene& s) { s.containers[0].tilt->keys[1].time = 0.2; },
      "containers[0].tilt.keys[1].time", "0.2", "later than the key before it"},
-    {"TiltAxisNoUnit", pour, [](Scene& s) { s.containers[0].tilt->axis *= 2; },
-     "containers[0].tilt.axis", "(0.0, 2.0, 0.0)", "a unit vector"},
-    {"TiltPivotOutsideDomain", pour, [](Scene& s) { s.containers[0].tilt->pivot.x() = 3; },
-     "containers[0].tilt.pivot", "(3.0, 0.0, 0.129)", "a point in the domain"},
+    {"TiltAxisNoUnit", pour, [](Scene& s) { s.containers[0].tilt->axis *= 2; }, "containers[0].tilt.axis",
+     "(0.0, 2.0, 0.0)", "a unit vector"},
+    {"TiltPivotOutsideDomain", pour, [](Scene& s) { s.containers[0].tilt->pivot.x() = 3; }, "containers[0].tilt.pivot",
+     "(3.0, 0.0, 0.129)", "a point in the domain"},
     {"TiltLeavesDomain", pour, [](Scene& s) { s.domain.min.x() = -0.16; }, "containers[0].tilt",
      "source reaches x = -0.165", ">= -0.16, the domain's end"},
-    {"ContainerOutsideDomain", pour, [](Scene& s) { s.domain.max.x() = 0.09; },
-     "containers[1].origin", "receiver reaches x = 0.0975", "<= 0.09, the domain's end"},
+    {"ContainerOutsideDomain", pour, [](Scene& s) { s.domain.max.x() = 0.09; }, "containers[1].origin",
+     "receiver reaches x = 0.0975", "<= 0.09, the domain's end"},
     {"ContainerBelowFloor", pour, [](Scene& s) { s.floor->height = 0.001; }, "containers[1].origin",
      "receiver reaches z = 0.0", ">= 0.001, the floor's height"},
     {"TiltReachesBelowFloor", pour,
@@ -98,61 +94,44 @@ const Unsound unsound[] = {
        s.domain.min.z() = -0.05;
      },
      "containers[0].tilt", "source reaches z = -0.02679", ">= 0.0, the floor's height"},
-    {"CupsOverlapAtTheStart", pour, [](Scene& s) { s.containers[1].origin.x() -= 0.012; },
-     "containers[1]", "receiver and source overlap by 0.003 at t = ", "apart by >= H = 0.0077"},
-    {"CupsWithinSupport", pour, [](Scene& s) { s.containers[1].origin.x() -= 0.0015; },
-     "containers[1]", "receiver and source are 0.0075", "apart by >= H = 0.0077"},
-    {"CupsMeetDuringTheTilt", pour,
-     [](Scene& s) {
-       s.containers.push_back(cup_at({-0.16, 0, 0.15}));
-     },
-     "containers[2]", "third and source overlap by", "at all times"},
-    {"CupInsideTheSolidOfAnother", pour,
-     [](Scene& s) {
-       s.containers.push_back(cup_at({0.0385, 0, 0.02}));
-     },
+    {"CupsOverlapAtTheStart", pour, [](Scene& s) { s.containers[1].origin.x() -= 0.012; }, "containers[1]",
+     "receiver and source overlap by 0.003 at t = ", "apart by >= H = 0.0077"},
+    {"CupsWithinSupport", pour, [](Scene& s) { s.containers[1].origin.x() -= 0.0015; }, "containers[1]",
+     "receiver and source are 0.0075", "apart by >= H = 0.0077"},
+    {"CupsMeetDuringTheTilt", pour, [](Scene& s) { s.containers.push_back(cup_at({-0.16, 0, 0.15})); }, "containers[2]",
+     "third and source overlap by", "at all times"},
+    {"CupInsideTheSolidOfAnother", pour, [](Scene& s) { s.containers.push_back(cup_at({0.0385, 0, 0.02})); },
      "containers[2]", "third and receiver are 0.002", "apart by >= H"},
     {"TankShorterThanThePeriod", channel,
-     [](Scene& s) { std::get<BoxShape>(s.containers[0].shape).solid[1].max.x() = 0.009; },
-     "containers[0]", "x from 0.0 to 0.009", "exactly the period, from 0.0 to 0.01"},
+     [](Scene& s) { std::get<BoxShape>(s.containers[0].shape).solid[1].max.x() = 0.009; }, "containers[0]",
+     "x from 0.0 to 0.009", "exactly the period, from 0.0 to 0.01"},
     {"TiltInAPeriodicDomain", channel,
-     [](Scene& s) {
-       s.containers[0].tilt = Tilt{Vec3::Zero(), Vec3::UnitX(), {{0, 0}, {1, 1}}};
-     },
-     "containers[0].tilt", "tilts", "the domain is periodic along x"},
+     [](Scene& s) { s.containers[0].tilt = Tilt{Vec3::Zero(), Vec3::UnitX(), {{0, 0}, {1, 1}}}; }, "containers[0].tilt",
+     "tilts", "the domain is periodic along x"},
     {"TranslationAlongThePeriodThatIsSpanned", channel,
-     [](Scene& s) { s.containers[0].translation.emplace().velocity = {0, 0.1, 0}; },
-     "containers[0].translation", "along y", "spans the domain's period"},
+     [](Scene& s) { s.containers[0].translation.emplace().velocity = {0, 0.1, 0}; }, "containers[0].translation",
+     "along y", "spans the domain's period"},
     {"TranslationKeysOutOfOrder", pour,
-     [](Scene& s) {
-       s.containers[1].translation.emplace().keys = {{1, Vec3::Zero()}, {1, Vec3::Zero()}};
-     },
+     [](Scene& s) { s.containers[1].translation.emplace().keys = {{1, Vec3::Zero()}, {1, Vec3::Zero()}}; },
      "containers[1].translation.keys[1].time", "1.0", "later than the key before it"},
     {"TranslationThatIsNoNumber", pour,
      [](Scene& s) { s.containers[1].translation.emplace().keys[0].offset.y() = nan; },
      "containers[1].translation.keys[0]", "0.0", "finite numbers"},
-    {"OscillationWithoutAFrequency", pour,
-     [](Scene& s) { s.containers[0].tilt->oscillation = {0.01, 0}; },
+    {"OscillationWithoutAFrequency", pour, [](Scene& s) { s.containers[0].tilt->oscillation = {0.01, 0}; },
      "containers[0].tilt.oscillation.frequency", "0.0", "> 0"},
-    {"TranslationLeavesDomain", pour,
-     [](Scene& s) { s.containers[1].translation.emplace().velocity = {0, 0.2, 0}; },
+    {"TranslationLeavesDomain", pour, [](Scene& s) { s.containers[1].translation.emplace().velocity = {0, 0.2, 0}; },
      // 59 mm of it lie in front, and 0.2 m/s · 3.4 s.
      "containers[1].translation", "receiver reaches y = 0.739", "<= 0.5, the domain's end"},
     {"SwayReachesBelowFloor", pour,
-     [](Scene& s) {
-       s.containers[1].translation.emplace().oscillation = {Vec3(0, 0, 0.001), 2};
-     },
+     [](Scene& s) { s.containers[1].translation.emplace().oscillation = {Vec3(0, 0, 0.001), 2}; },
      "containers[1].translation", "receiver reaches z = -0.001", ">= 0.0, the floor's height"},
     {"CupsMeetInASway", pour,
-     [](Scene& s) {
-       s.containers[1].translation.emplace().oscillation = {Vec3(0.002, 0, 0), 5};
-     },
-     "containers[1]", "receiver and source are 0.007", "apart by >= H = 0.0077"},
+     [](Scene& s) { s.containers[1].translation.emplace().oscillation = {Vec3(0.002, 0, 0), 5}; }, "containers[1]",
+     "receiver and source are 0.007", "apart by >= H = 0.0077"},
     {"MixerMeetsItsNeighborLateInItsTurn", pour,
      [](Scene& s) {
        // Round a line above it; it comes back to where it began from the other side.
-       s.containers[0].tilt =
-           Tilt{s.containers[0].origin + Vec3(0, 0, 0.12), Vec3::UnitY(), {{0, 0}}, 2};
+       s.containers[0].tilt = Tilt{s.containers[0].origin + Vec3(0, 0, 0.12), Vec3::UnitY(), {{0, 0}}, 2};
      },
      "containers[1]", "receiver and source overlap by", "at all times"},
     {"PistonTheFluidCannotFollow", dam,
@@ -162,14 +141,11 @@ const Unsound unsound[] = {
      },
      // 3/2 of the mean speed, 5 m/s, at halfway.
      "fluid.sound_speed", "", "where the speed to expect is 7.65"},
-    {"FillThroughABlade", dam,
-     [](Scene& s) { s.containers.push_back(blade_at({0.02, 0.015, 0.03})); },
-     "fill[0]", "a particle at (", "a fill leaves room for what its `around` names"},
-    {"FillAroundItsOwnContainer", dam,
-     [](Scene& s) { s.fills[0].around = {"tank"}; }, "fill[0].around", "tank",
+    {"FillThroughABlade", dam, [](Scene& s) { s.containers.push_back(blade_at({0.02, 0.015, 0.03})); }, "fill[0]",
+     "a particle at (", "a fill leaves room for what its `around` names"},
+    {"FillAroundItsOwnContainer", dam, [](Scene& s) { s.fills[0].around = {"tank"}; }, "fill[0].around", "tank",
      "the name of another container"},
-    {"FillAroundNothingKnown", dam,
-     [](Scene& s) { s.fills[0].around = {"gate"}; }, "fill[0].around", "gate",
+    {"FillAroundNothingKnown", dam, [](Scene& s) { s.fills[0].around = {"gate"}; }, "fill[0].around", "gate",
      "the name of another container"},
     {"FillAroundABladeThatHitsTheTank", dam,
      [](Scene& s) {
@@ -187,65 +163,47 @@ const Unsound unsound[] = {
      "containers[1].origin", "receiver reaches x = 0.0975", "H inside the periodic boundary"},
     {"LevelAboveTheCup", pour, [](Scene& s) { s.fills[0].level = 0.091; }, "fill[0].level", "0.091",
      "<= 0.09, the inner height of source"},
-    {"LevelAboveTheTank", channel, [](Scene& s) { s.fills[0].level = 0.021; }, "fill[0].level",
-     "0.021", "<= 0.02, the inner height of plates"},
-    {"BoxOutsideItsTank", dam, [](Scene& s) { s.fills[0].box->max.x() = 0.31; }, "fill[0].box",
-     "x 0.0 to 0.31", "within the cavity of tank, x 0.0 to 0.3"},
+    {"LevelAboveTheTank", channel, [](Scene& s) { s.fills[0].level = 0.021; }, "fill[0].level", "0.021",
+     "<= 0.02, the inner height of plates"},
+    {"BoxOutsideItsTank", dam, [](Scene& s) { s.fills[0].box->max.x() = 0.31; }, "fill[0].box", "x 0.0 to 0.31",
+     "within the cavity of tank, x 0.0 to 0.3"},
     {"BoxThroughAnObstacle", dam,
-     [](Scene& s) {
-       std::get<BoxShape>(s.containers[0].shape)
-           .solid.push_back({{0.05, 0, 0}, {0.07, 0.05, 0.02}});
-     },
+     [](Scene& s) { std::get<BoxShape>(s.containers[0].shape).solid.push_back({{0.05, 0, 0}, {0.07, 0.05, 0.02}}); },
      "fill[0].box", "x 0.0 to 0.06", "where a box stands at x 0.05 to 0.07"},
     {"BoxCornersOutsideItsCup", pour,
-     [](Scene& s) {
-       s.fills[0].box = SolidBox{{-0.02, -0.03, 0}, {0.02, 0.03, 0.05}};
-     },
-     "fill[0].box", "x -0.02 to 0.02", "r <= 0.035"},
-    {"BoxAboveItsCup", pour,
-     [](Scene& s) {
-       s.fills[0].box = SolidBox{{-0.02, -0.02, 0.05}, {0.02, 0.02, 0.1}};
-     },
+     [](Scene& s) { s.fills[0].box = SolidBox{{-0.02, -0.03, 0}, {0.02, 0.03, 0.05}}; }, "fill[0].box",
+     "x -0.02 to 0.02", "r <= 0.035"},
+    {"BoxAboveItsCup", pour, [](Scene& s) { s.fills[0].box = SolidBox{{-0.02, -0.02, 0.05}, {0.02, 0.02, 0.1}}; },
      "fill[0].box", "z 0.05 to 0.1", "z from 0.0 to 0.09, the cavity of source"},
     {"FreeBoxOutsideDomain", pour,
-     [](Scene& s) {
-       s.fills.push_back({"", 0, SolidBox{{0.4, 0, 0}, {0.6, 0.1, 0.1}}, {}});
-     },
-     "fill[1].box", "x 0.4 to 0.6", "within the domain, x -0.5 to 0.5"},
+     [](Scene& s) { s.fills.push_back({"", 0, SolidBox{{0.4, 0, 0}, {0.6, 0.1, 0.1}}, {}}); }, "fill[1].box",
+     "x 0.4 to 0.6", "within the domain, x -0.5 to 0.5"},
     {"FreeBoxBelowFloor", pour,
-     [](Scene& s) {
-       s.fills.push_back({"", 0, SolidBox{{0.2, 0, -0.01}, {0.3, 0.1, 0.1}}, {}});
-     },
-     "fill[1].box.min[2]", "-0.01", ">= 0.0, the floor's height"},
+     [](Scene& s) { s.fills.push_back({"", 0, SolidBox{{0.2, 0, -0.01}, {0.3, 0.1, 0.1}}, {}}); }, "fill[1].box.min[2]",
+     "-0.01", ">= 0.0, the floor's height"},
     {"FreeBoxThroughACup", pour,
-     [](Scene& s) {
-       s.fills.push_back({"", 0, SolidBox{{0.02, 0, 0.05}, {0.12, 0.05, 0.1}}, {}});
-     },
-     "fill[1]", "a particle at (", "from every wall"},
+     [](Scene& s) { s.fills.push_back({"", 0, SolidBox{{0.02, 0, 0.05}, {0.12, 0.05, 0.1}}, {}}); }, "fill[1]",
+     "a particle at (", "from every wall"},
     {"FreeBoxThroughATank", dam,
-     [](Scene& s) {
-       s.fills.push_back({"", 0, SolidBox{{0.2, 0, 0.1}, {0.31, 0.05, 0.2}}, {}});
-     },
-     "fill[1].box", "x 0.2 to 0.31", "clear of the walls of tank"},
+     [](Scene& s) { s.fills.push_back({"", 0, SolidBox{{0.2, 0, 0.1}, {0.31, 0.05, 0.2}}, {}}); }, "fill[1].box",
+     "x 0.2 to 0.31", "clear of the walls of tank"},
     {"FillsThatOverlap", dam,
-     [](Scene& s) {
-       s.fills.push_back({"", 0, SolidBox{{0.05, 0, 0.1}, {0.2, 0.05, 0.2}}, {}});
-     },
-     "fill[1]", "from one of fill[0]", "fills that do not overlap"},
-    {"FillWithoutRoomForAParticle", pour, [](Scene& s) { s.fills[0].level = 0.003; }, "fill[0]",
-     "no particle", "room for at least one"},
-    {"SoundSlowerThanFourTimesTheFall", pour, [](Scene& s) { s.fluid.sound_speed = 8; },
-     "fluid.sound_speed", "8.0", ">= 4 v_max = 8.33"},
-    {"SubstepBeyondCfl", pour, [](Scene& s) { s.schedule.substeps_per_frame = 20; },
-     "time.substeps_per_frame", "20", "the CFL limit 0.4 h / (c0 + v_max)"},
-    {"SubstepBeyondCflHoweverCourantAsks", pour, [](Scene& s) { s.schedule.courant = 0.5; },
-     "time.courant", "0.5", "(0, 0.4]"},
-    {"SubstepBeyondTheViscousLimit", pour, [](Scene& s) { s.fluid.viscosity = 20; },
-     "time.substeps_per_frame", "27", "the viscous limit 0.125 h² rho0 / max(mu, mu_w / 2)"},
-    {"NoSubsteps", pour, [](Scene& s) { s.schedule.substeps_per_frame = 0; },
-     "time.substeps_per_frame", "0", "at least 1"},
-    {"GravityAlongAPeriodWithoutASpeed", channel, [](Scene& s) { s.schedule.max_speed.reset(); },
-     "time.max_speed", "missing", "gravity pulls along the periodic axis x"},
+     [](Scene& s) { s.fills.push_back({"", 0, SolidBox{{0.05, 0, 0.1}, {0.2, 0.05, 0.2}}, {}}); }, "fill[1]",
+     "from one of fill[0]", "fills that do not overlap"},
+    {"FillWithoutRoomForAParticle", pour, [](Scene& s) { s.fills[0].level = 0.003; }, "fill[0]", "no particle",
+     "room for at least one"},
+    {"SoundSlowerThanFourTimesTheFall", pour, [](Scene& s) { s.fluid.sound_speed = 8; }, "fluid.sound_speed", "8.0",
+     ">= 4 v_max = 8.33"},
+    {"SubstepBeyondCfl", pour, [](Scene& s) { s.schedule.substeps_per_frame = 20; }, "time.substeps_per_frame", "20",
+     "the CFL limit 0.4 h / (c0 + v_max)"},
+    {"SubstepBeyondCflHoweverCourantAsks", pour, [](Scene& s) { s.schedule.courant = 0.5; }, "time.courant", "0.5",
+     "(0, 0.4]"},
+    {"SubstepBeyondTheViscousLimit", pour, [](Scene& s) { s.fluid.viscosity = 20; }, "time.substeps_per_frame", "27",
+     "the viscous limit 0.125 h² rho0 / max(mu, mu_w / 2)"},
+    {"NoSubsteps", pour, [](Scene& s) { s.schedule.substeps_per_frame = 0; }, "time.substeps_per_frame", "0",
+     "at least 1"},
+    {"GravityAlongAPeriodWithoutASpeed", channel, [](Scene& s) { s.schedule.max_speed.reset(); }, "time.max_speed",
+     "missing", "gravity pulls along the periodic axis x"},
 };
 
 class UnsoundScene : public testing::TestWithParam<Unsound> {};
@@ -292,8 +250,7 @@ TEST(SceneChecks, AcceptsFillsThatTouch) {
 
 TEST(SceneChecks, ContainersASupportApartAreNotRefused) {
   Scene scene = pour();
-  scene.containers[1].origin.x() =
-      scene.containers[0].origin.x() + 0.044 + 0.059 + scene.support_radius();
+  scene.containers[1].origin.x() = scene.containers[0].origin.x() + 0.044 + 0.059 + scene.support_radius();
   EXPECT_NO_THROW(check_scene(scene, "pour"));
 }
 

@@ -39,8 +39,7 @@ void find_values(const json& at, const std::string& path, const std::set<std::st
   if (keys.contains(path)) {
     found[path].insert(at.dump());
   } else if (at.is_object()) {
-    for (const auto& [key, value] : at.items())
-      find_values(value, path.empty() ? key : path + "." + key, keys, found);
+    for (const auto& [key, value] : at.items()) find_values(value, path.empty() ? key : path + "." + key, keys, found);
   } else if (at.is_array()) {
     for (const json& item : at) find_values(item, path + "[]", keys, found);
   } else {
@@ -179,13 +178,13 @@ const std::vector<Aspect>& aspects() {
        }},
       {"box that turns",
        [](const Fixture& f) {
-         return any_container(
-             f, [&](const Container& c) { return !revolved(c) && c.tilt && rate_now(f, *c.tilt) != 0; });
+         return any_container(f,
+                              [&](const Container& c) { return !revolved(c) && c.tilt && rate_now(f, *c.tilt) != 0; });
        }},
       {"revolved shape that turns",
        [](const Fixture& f) {
-         return any_container(
-             f, [&](const Container& c) { return revolved(c) && c.tilt && rate_now(f, *c.tilt) != 0; });
+         return any_container(f,
+                              [&](const Container& c) { return revolved(c) && c.tilt && rate_now(f, *c.tilt) != 0; });
        }},
       {"tilt whose third key decides where the container is",
        [](const Fixture& f) { return any_tilt(f, [&](const Tilt& t) { return third_key_counts(f, t); }); }},
@@ -219,9 +218,7 @@ const std::vector<Aspect>& aspects() {
          });
        }},
       {"tilt about no axis of the world",
-       [](const Fixture& f) {
-         return any_tilt(f, [](const Tilt& t) { return t.axis.cwiseAbs().maxCoeff() < 1; });
-       }},
+       [](const Fixture& f) { return any_tilt(f, [](const Tilt& t) { return t.axis.cwiseAbs().maxCoeff() < 1; }); }},
       {"particle at a wall",
        [](const Fixture& f) {
          bool floor = false;
@@ -260,17 +257,14 @@ std::vector<std::string> Coverage::gaps(const std::set<std::string>& keys) const
   for (const std::string& key : keys) {
     if (keys_without_influence().contains(key)) continue;
     const auto found = values.find(key);
-    if (found == values.end())
-      missing.push_back(key + ": in none");
+    if (found == values.end()) missing.push_back(key + ": in none");
     else if (found->second.size() < 2)
       missing.push_back(fmt::format("{}: {} alone", key, found->second.begin()->first));
   }
   for (const Aspect& aspect : decant::test::aspects()) {
     const auto found = aspects.find(aspect.name);
-    if (found == aspects.end())
-      missing.push_back(std::string(aspect.name) + ": in none");
-    else if (found->second.size() == problems.size())
-      missing.push_back(std::string(aspect.name) + ": in all");
+    if (found == aspects.end()) missing.push_back(std::string(aspect.name) + ": in none");
+    else if (found->second.size() == problems.size()) missing.push_back(std::string(aspect.name) + ": in all");
   }
   return missing;
 }
@@ -287,8 +281,8 @@ Coverage coverage_of_fuzzing(int problems) {
   Coverage coverage;
   const auto keys = leaf_keys_of_scenes();
   for (int seed = 1; seed <= problems; ++seed)
-    coverage.add(keys, fuzz::problem_of(fuzz::random_genome(static_cast<std::uint64_t>(seed)),
-                                        fmt::format("fuzz-{}", seed)));
+    coverage.add(keys,
+                 fuzz::problem_of(fuzz::random_genome(static_cast<std::uint64_t>(seed)), fmt::format("fuzz-{}", seed)));
   return coverage;
 }
 
@@ -321,8 +315,7 @@ std::string coverage_table(const Coverage& fixtures, const Coverage& fuzzing) {
       return found == c.aspects.end() ? std::set<std::string>{} : found->second;
     };
     text += fmt::format("{:<54} {:>10} {:>6.1f} %  {}\n", aspect.name, who(fixtures).size(),
-                        100.0 * static_cast<double>(who(fuzzing).size()) /
-                            static_cast<double>(fuzzing.problems.size()),
+                        100.0 * static_cast<double>(who(fuzzing).size()) / static_cast<double>(fuzzing.problems.size()),
                         names(who(fixtures), 4));
   }
   return text;

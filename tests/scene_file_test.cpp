@@ -151,41 +151,37 @@ const Malformed malformed[] = {
     {"/containers/0/cup/wall_thickness", "-1", "containers[0].cup.wall_thickness", "-1", "(0.0, "},
     {"/containers/0/origin", "[0, 0]", "containers[0].origin", "[0,0]", "3 elements, not 2"},
     {"/containers/1/tank/size", "[1, 1, 0]", "containers[1].tank.size[2]", "0", "(0.0, "},
-    {"/containers/1/tank",
-     R"({"size": [0.2, 0.1, 0.1], "wall_thickness": 0.15, "open": ["-y", "+y"]})",
+    {"/containers/1/tank", R"({"size": [0.2, 0.1, 0.1], "wall_thickness": 0.15, "open": ["-y", "+y"]})",
      "containers[1].tank.size[1]", "0.1", "where both faces are open"},
     {"/containers/1/tank/open", "[\"z\"]", "containers[1].tank.open[0]", "\"z\"", "-x, +x, -y"},
     {"/containers/1/tank/open", "[\"+z\", \"+z\"]", "containers[1].tank.open[1]", "\"+z\"", "once"},
-    {"/containers/1/tank/open", "[\"-x\", \"+x\", \"-y\", \"+y\", \"-z\", \"+z\"]",
-     "containers[1].tank.open", "[\"-x\"", "0 to 5 elements, not 6"},
-    {"/containers/2/revolved/profile", "[[0, 0], [1, 1]]", "containers[2].revolved.profile",
-     "[[0,0]", "3 to 1000 elements, not 2"},
-    {"/containers/2/revolved/profile/1", "[-1, 0]", "containers[2].revolved.profile[1][0]", "-1",
-     "[0.0, "},
-    {"/containers/2/revolved/profile", "[[0, 0], [0, 1], [1, 1], [1, 0]]",
-     "containers[2].revolved.profile", "[[0,0]", "solid on its left"},
-    {"/containers/2/revolved/profile", "[[0, 0], [1, 1], [1, 0], [0, 1.5]]",
-     "containers[2].revolved.profile[2]", "[1,0]", "does not cross itself"},
-    {"/containers/2/revolved/profile/2", "[0.01, 0]", "containers[2].revolved.profile[1]",
-     "[0.01,0]", "different from the point after it"},
+    {"/containers/1/tank/open", "[\"-x\", \"+x\", \"-y\", \"+y\", \"-z\", \"+z\"]", "containers[1].tank.open",
+     "[\"-x\"", "0 to 5 elements, not 6"},
+    {"/containers/2/revolved/profile", "[[0, 0], [1, 1]]", "containers[2].revolved.profile", "[[0,0]",
+     "3 to 1000 elements, not 2"},
+    {"/containers/2/revolved/profile/1", "[-1, 0]", "containers[2].revolved.profile[1][0]", "-1", "[0.0, "},
+    {"/containers/2/revolved/profile", "[[0, 0], [0, 1], [1, 1], [1, 0]]", "containers[2].revolved.profile", "[[0,0]",
+     "solid on its left"},
+    {"/containers/2/revolved/profile", "[[0, 0], [1, 1], [1, 0], [0, 1.5]]", "containers[2].revolved.profile[2]",
+     "[1,0]", "does not cross itself"},
+    {"/containers/2/revolved/profile/2", "[0.01, 0]", "containers[2].revolved.profile[1]", "[0.01,0]",
+     "different from the point after it"},
     {"/containers/3/boxes/solid", "[]", "containers[3].boxes.solid", "[]", "1 to 1000 elements"},
     {"/containers/3/boxes/solid/0/max/2", "0.01", "containers[3].boxes.solid[0]", "{",
      "no thinner than wall_thickness, which is 0.02"},
-    {"/containers/3/boxes/cavity/max/0", "0", "containers[3].boxes.cavity.max[0]", "0",
-     "greater than min"},
+    {"/containers/3/boxes/cavity/max/0", "0", "containers[3].boxes.cavity.max[0]", "0", "greater than min"},
     {"/containers/0/tilt/axis", "[0, 0, 0]", "containers[0].tilt.axis", "[0,0,0]", "longer than"},
     {"/containers/0/tilt/keys", "[]", "containers[0].tilt.keys", "[]", "1 to 10000 elements"},
     {"/containers/0/tilt/keys/1/time", "0.1", "containers[0].tilt.keys[1].time", "0.1",
      "later than the key before it, at 0.1"},
     {"/containers/0/tilt/keys/0/time", "-1", "containers[0].tilt.keys[0].time", "-1", "[0.0, "},
     {"/containers/0/tilt/keys/0/angle", "1", "containers[0].tilt.keys[0]", "{", "exactly one of"},
-    {"/containers/0/tilt/keys/0/angle_deg", "1000001", "containers[0].tilt.keys[0].angle_deg",
-     "1000001", "[-1000000.0, 1000000.0]"},
-    {"/containers/0/tilt/keys", "", "containers[0].tilt", "{",
-     "at least one of keys, rate, oscillation"},
+    {"/containers/0/tilt/keys/0/angle_deg", "1000001", "containers[0].tilt.keys[0].angle_deg", "1000001",
+     "[-1000000.0, 1000000.0]"},
+    {"/containers/0/tilt/keys", "", "containers[0].tilt", "{", "at least one of keys, rate, oscillation"},
     {"/containers/0/tilt/rate", "[1]", "containers[0].tilt.rate", "[1]", "a number in"},
-    {"/containers/0/tilt/oscillation", R"({"amplitude": 1})",
-     "containers[0].tilt.oscillation.frequency", "missing", "a required key"},
+    {"/containers/0/tilt/oscillation", R"({"amplitude": 1})", "containers[0].tilt.oscillation.frequency", "missing",
+     "a required key"},
     {"/containers/0/tilt/oscillation", R"({"amplitude": 1, "frequency": 0})",
      "containers[0].tilt.oscillation.frequency", "0", "(0.0, "},
     {"/containers/0/tilt/oscillation", R"({"amplitude": [1, 0, 0], "frequency": 1})",
@@ -194,30 +190,26 @@ const Malformed malformed[] = {
      "at least one of keys, velocity, oscillation"},
     {"/containers/0/translation", R"({"keys": [{"time": 1, "offset": [0, 0]}]})",
      "containers[0].translation.keys[0].offset", "[0,0]", "3 elements, not 2"},
-    {"/containers/0/translation",
-     R"({"keys": [{"time": 1, "offset": [0, 0, 0]}, {"time": 1, "offset": [0, 0, 1]}]})",
+    {"/containers/0/translation", R"({"keys": [{"time": 1, "offset": [0, 0, 0]}, {"time": 1, "offset": [0, 0, 1]}]})",
      "containers[0].translation.keys[1].time", "1", "later than the key before it, at 1.0"},
-    {"/containers/0/translation", R"({"velocity": 1})", "containers[0].translation.velocity", "1",
-     "an array"},
+    {"/containers/0/translation", R"({"velocity": 1})", "containers[0].translation.velocity", "1", "an array"},
     {"/containers/0/translation", R"({"oscillation": {"amplitude": 1, "frequency": 1}})",
      "containers[0].translation.oscillation.amplitude", "1", "an array"},
     {"/fill/0/around", "[\"cup\"]", "fill[0].around[0]", "\"cup\"", "source, tank, peg, step"},
     {"/fill/0/around", "[\"source\"]", "fill[0].around[0]", "\"source\"",
      "another container than the one that is filled"},
     {"/fill/0/around", "[\"peg\", \"peg\"]", "fill[0].around[1]", "\"peg\"", "each container once"},
-    {"/containers/0/surface_velocity", "[1, 0]", "containers[0].surface_velocity", "[1,0]",
-     "3 elements, not 2"},
+    {"/containers/0/surface_velocity", "[1, 0]", "containers[0].surface_velocity", "[1,0]", "3 elements, not 2"},
     {"/fill/1/ball", "{}", "fill[1]", "{", "exactly one of level, box, ball, rod"},
-    {"/fill/1", R"({"ball": {"center": [0, 0, 0.3], "radius": 0}})", "fill[1].ball.radius", "0",
-     "(0.0, "},
-    {"/fill/1", R"({"rod": {"center": [0, 0, 0.3], "radius": 0.1, "axis": "w", "length": 1}})",
-     "fill[1].rod.axis", "\"w\"", "one of x, y, z"},
-    {"/fill/1", R"({"rod": {"center": [0, 0, 0.3], "radius": 0.1, "axis": "x"}})",
-     "fill[1].rod.length", "missing", "a required key"},
-    {"/fill/1/velocity_gradient", R"({"matrix": [[1, 0, 0]], "about": [0, 0, 0]})",
-     "fill[1].velocity_gradient.matrix", "[[1", "3 elements, not 1"},
-    {"/fill/1/velocity_gradient", R"({"matrix": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]})",
-     "fill[1].velocity_gradient.about", "missing", "a required key"},
+    {"/fill/1", R"({"ball": {"center": [0, 0, 0.3], "radius": 0}})", "fill[1].ball.radius", "0", "(0.0, "},
+    {"/fill/1", R"({"rod": {"center": [0, 0, 0.3], "radius": 0.1, "axis": "w", "length": 1}})", "fill[1].rod.axis",
+     "\"w\"", "one of x, y, z"},
+    {"/fill/1", R"({"rod": {"center": [0, 0, 0.3], "radius": 0.1, "axis": "x"}})", "fill[1].rod.length", "missing",
+     "a required key"},
+    {"/fill/1/velocity_gradient", R"({"matrix": [[1, 0, 0]], "about": [0, 0, 0]})", "fill[1].velocity_gradient.matrix",
+     "[[1", "3 elements, not 1"},
+    {"/fill/1/velocity_gradient", R"({"matrix": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]})", "fill[1].velocity_gradient.about",
+     "missing", "a required key"},
     {"/fill", "[]", "fill", "[]", "1 to 1000 elements, not 0"},
     {"/fill/0/container", "\"cup\"", "fill[0].container", "\"cup\"", "source, tank, peg, step"},
     {"/fill/0/level", "-0.01", "fill[0].level", "-0.01", "(0.0, "},
@@ -227,8 +219,7 @@ const Malformed malformed[] = {
     {"/fill/1/velocity", "[1]", "fill[1].velocity", "[1]", "3 elements, not 1"},
     {"/time/end", "0", "time.end", "0", "(0.0, "},
     {"/time/frames", "0", "time.frames", "0", "an integer in [1, 1000000]"},
-    {"/time/frames", "18446744073709551615", "time.frames", "18446744073709551615",
-     "an integer in"},
+    {"/time/frames", "18446744073709551615", "time.frames", "18446744073709551615", "an integer in"},
     {"/time/courant", "0.41", "time.courant", "0.41", "(0.0, 0.4]"},
     {"/time/courant", "0", "time.courant", "0", "(0.0, 0.4]"},
     {"/time/max_speed", "-2", "time.max_speed", "-2", "(0.0, "},
@@ -246,10 +237,8 @@ TEST_P(MalformedScene, IsRefusedWithFileKeyValueAndBound) {
   const Malformed& wrong = GetParam();
   json scene = valid_scene();
   const json::json_pointer at(wrong.pointer);
-  if (*wrong.text)
-    scene[at] = json::parse(wrong.text);
-  else
-    scene[at.parent_pointer()].erase(at.back());
+  if (*wrong.text) scene[at] = json::parse(wrong.text);
+  else scene[at.parent_pointer()].erase(at.back());
   const InputError error = refusal_of([&] { parse_scene(scene.dump(), "wrong.json"); });
   EXPECT_EQ(error.file(), "wrong.json");
   EXPECT_EQ(error.key(), wrong.key);
@@ -272,8 +261,8 @@ TEST(SceneFile, RefusesAnUnknownKeyAndNamesItAndTheKnownOnes) {
 }
 
 TEST(SceneFile, RefusesAKeyThatStandsTwiceInOneObject) {
-  const InputError error = refusal_of(
-      [] { parse_scene(R"({"fill": [{}, {"box": {"min": 1, "min": 2}}]})", "twice.json"); });
+  const InputError error =
+      refusal_of([] { parse_scene(R"({"fill": [{}, {"box": {"min": 1, "min": 2}}]})", "twice.json"); });
   EXPECT_EQ(error.key(), "fill[1].box.min");
   EXPECT_EQ(error.value(), "given twice");
 }
@@ -284,8 +273,8 @@ TEST(SceneFile, NamesTheEmptyKey) {
 }
 
 TEST(SceneFile, NamesLineAndColumnOfBadSyntax) {
-  const InputError error = refusal_of(
-      [] { parse_scene("{\n  // half a scene\n  \"fluid\": {\"a\": 1,]\n}", "s.json"); });
+  const InputError error =
+      refusal_of([] { parse_scene("{\n  // half a scene\n  \"fluid\": {\"a\": 1,]\n}", "s.json"); });
   EXPECT_EQ(error.file(), "s.json");
   EXPECT_EQ(error.key(), "fluid.a");
   EXPECT_EQ(error.value(), "line 3, column 20");
@@ -293,8 +282,7 @@ TEST(SceneFile, NamesLineAndColumnOfBadSyntax) {
 }
 
 TEST(SceneFile, RefusesNumbersThatNoDoubleHolds) {
-  const InputError huge =
-      refusal_of([] { parse_scene(R"({"fluid": {"viscosity": 1e999}})", "s.json"); });
+  const InputError huge = refusal_of([] { parse_scene(R"({"fluid": {"viscosity": 1e999}})", "s.json"); });
   EXPECT_EQ(huge.key(), "fluid.viscosity");
   EXPECT_EQ(huge.value(), "1e999");
   for (const char* text : {R"({"gravity": [0, 0, NaN]})", R"({"gravity": [0, 0, -Infinity]})"})

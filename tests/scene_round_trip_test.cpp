@@ -21,8 +21,7 @@ class Bits {
  public:
   explicit Bits(const Scene& s) {
     add(s.particle_spacing, s.support_ratio, s.mass_ratio);
-    add(s.fluid.rest_density, s.fluid.sound_speed, s.fluid.eos_exponent, s.fluid.viscosity,
-        s.fluid.wall_viscosity);
+    add(s.fluid.rest_density, s.fluid.sound_speed, s.fluid.eos_exponent, s.fluid.viscosity, s.fluid.wall_viscosity);
     add(s.gravity), add(s.domain.min), add(s.domain.max);
     if (s.floor) add(s.floor->height);
     add(s.contact.distance_ratio, s.contact.restitution, s.contact.friction);
@@ -43,8 +42,7 @@ class Bits {
       if (c.translation) {
         add(c.translation->velocity);
         for (const auto& key : c.translation->keys) add(key.time), add(key.offset);
-        if (const auto& o = c.translation->oscillation)
-          add(o->amplitude), add(o->frequency, o->phase);
+        if (const auto& o = c.translation->oscillation) add(o->amplitude), add(o->frequency, o->phase);
       }
     }
     for (const auto& fill : s.fills) {
@@ -87,14 +85,11 @@ bool same(const Scene& a, const Scene& b) {
     return false;
   for (std::size_t i = 0; i < a.containers.size(); ++i) {
     const auto &c = a.containers[i], &d = b.containers[i];
-    if (c.name != d.name || c.shape.index() != d.shape.index() ||
-        c.tilt.has_value() != d.tilt.has_value() ||
+    if (c.name != d.name || c.shape.index() != d.shape.index() || c.tilt.has_value() != d.tilt.has_value() ||
         c.translation.has_value() != d.translation.has_value())
       return false;
     if (c.tilt && c.tilt->oscillation.has_value() != d.tilt->oscillation.has_value()) return false;
-    if (c.translation &&
-        c.translation->oscillation.has_value() != d.translation->oscillation.has_value())
-      return false;
+    if (c.translation && c.translation->oscillation.has_value() != d.translation->oscillation.has_value()) return false;
     const auto* boxes = std::get_if<BoxShape>(&c.shape);
     if (boxes && boxes->endless != std::get<BoxShape>(d.shape).endless) return false;
   }
@@ -180,10 +175,8 @@ Scene any_scene() {
     Fill fill;
     if (!s.containers.empty() && coin())
       fill.container = s.containers[static_cast<std::size_t>(integer(0, containers - 1))].name;
-    if (!fill.container.empty() && coin())
-      fill.level = real(0.01, 1);
-    else if (coin())
-      fill.box = box();
+    if (!fill.container.empty() && coin()) fill.level = real(0.01, 1);
+    else if (coin()) fill.box = box();
     else {
       fill.round = RoundShape{vec(-1, 1), real(0.1, 1)};
       if (coin()) {

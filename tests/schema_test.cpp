@@ -21,8 +21,7 @@ class Schema : public FixtureFile {
  protected:
   void SetUp() override {
     FixtureFile::SetUp();
-    if (!test::python_has("h5py"))
-      GTEST_SKIP() << "no h5py in " << test::python() << "; ci/setup makes it";
+    if (!test::python_has("h5py")) GTEST_SKIP() << "no h5py in " << test::python() << "; ci/setup makes it";
   }
 };
 

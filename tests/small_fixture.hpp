@@ -42,9 +42,7 @@ inline Scene small_scene() {
   return scene;
 }
 
-inline Eigen::VectorXd positive(Eigen::Index n) {
-  return Eigen::VectorXd::Random(n).array().abs() + 0.5;
-}
+inline Eigen::VectorXd positive(Eigen::Index n) { return Eigen::VectorXd::Random(n).array().abs() + 0.5; }
 
 /// A fixture whose fields are of the right kind; what they are does not matter to a file.
 inline Fixture small_fixture() {
@@ -64,8 +62,8 @@ inline Fixture small_fixture() {
   for (auto* a : {&fields.acceleration, &fields.pressure_acceleration, &fields.viscous_acceleration,
                   &fields.wall_pressure_acceleration, &fields.wall_viscous_acceleration})
     a->setRandom();
-  for (auto* c : {&fields.fluid_neighbor_count, &fields.fluid_neighbor_id_sum,
-                  &fields.wall_neighbor_count, &fields.wall_neighbor_id_sum})
+  for (auto* c : {&fields.fluid_neighbor_count, &fields.fluid_neighbor_id_sum, &fields.wall_neighbor_count,
+                  &fields.wall_neighbor_id_sum})
     *c = IdVector::LinSpaced(n, 0, n - 1);
   ConditionSums& sums = f.condition.emplace();
   sums.density = sums.density_pose = positive(n);
@@ -80,8 +78,7 @@ inline Fixture small_fixture() {
 class FixtureFile : public testing::Test {
  protected:
   void SetUp() override {
-    std::string pattern =
-        (std::filesystem::temp_directory_path() / "decant-fixture-XXXXXX").string();
+    std::string pattern = (std::filesystem::temp_directory_path() / "decant-fixture-XXXXXX").string();
     ASSERT_NE(mkdtemp(pattern.data()), nullptr);
     folder_ = pattern;
     file_ = folder_ / "beaker-settled.h5";
@@ -123,16 +120,13 @@ class FixtureFile : public testing::Test {
     });
   }
   /// Puts a dataset of other type or shape in a dataset's place, filled with ones.
-  void reshape(const std::string& path, const std::vector<hsize_t>& dims,
-               hid_t type = H5T_IEEE_F64LE) const {
+  void reshape(const std::string& path, const std::vector<hsize_t>& dims, hid_t type = H5T_IEEE_F64LE) const {
     edit([&](hid_t file) {
-      if (H5Lexists(file, path.c_str(), H5P_DEFAULT) > 0)
-        H5Ldelete(file, path.c_str(), H5P_DEFAULT);
+      if (H5Lexists(file, path.c_str(), H5P_DEFAULT) > 0) H5Ldelete(file, path.c_str(), H5P_DEFAULT);
       hsize_t count = 1;
       for (const hsize_t n : dims) count *= n;
       const hid_t space = H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr);
-      const hid_t data =
-          H5Dcreate2(file, path.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+      const hid_t data = H5Dcreate2(file, path.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
       if (count < 1'000'000) {
         const std::vector<double> ones(count, 1.0);
         H5Dwrite(data, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, ones.data());
@@ -142,17 +136,15 @@ class FixtureFile : public testing::Test {
     });
   }
   template <typename T>
-  void set_attribute(const std::string& object, const std::string& name, hid_t type,
-                     const T& value) const {
+  void set_attribute(const std::string& object, const std::string& name, hid_t type, const T& value) const {
     write_attribute(object, name, type, &value);
   }
-  void write_attribute(const std::string& object, const std::string& name, hid_t type,
-                       const void* value) const {
+  void write_attribute(const std::string& object, const std::string& name, hid_t type, const void* value) const {
     edit([&](hid_t file) {
       H5Adelete_by_name(file, object.c_str(), name.c_str(), H5P_DEFAULT);
       const hid_t space = H5Screate(H5S_SCALAR);
-      const hid_t attribute = H5Acreate_by_name(file, object.c_str(), name.c_str(), type, space,
-                                                H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+      const hid_t attribute =
+          H5Acreate_by_name(file, object.c_str(), name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
       H5Awrite(attribute, type, value);
       H5Aclose(attribute);
       H5Sclose(space);
@@ -171,8 +163,7 @@ class FixtureFile : public testing::Test {
       const hid_t type = H5Tcopy(H5T_C_S1);
       H5Tset_size(type, text.size());
       const hid_t space = H5Screate(H5S_SCALAR);
-      const hid_t data =
-          H5Dcreate2(file, "/scene", type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+      const hid_t data = H5Dcreate2(file, "/scene", type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
       H5Dwrite(data, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, text.data());
       H5Dclose(data);
       H5Sclose(space);
@@ -182,8 +173,7 @@ class FixtureFile : public testing::Test {
   }
 
   /// Asserts that the file is refused, naming it, the key, and these parts of value and bound.
-  void expect_refused(const std::string& key, const std::string& value,
-                      const std::string& bound) const {
+  void expect_refused(const std::string& key, const std::string& value, const std::string& bound) const {
     try {
       read_fixture(file_);
       ADD_FAILURE() << "was accepted; expected a complaint about " << key;

@@ -15,8 +15,8 @@ namespace {
 
 constexpr double dt = 1.0 / 1024;  // s, as open_scene has it
 
-ParticleState after(const Scene& scene, const Walls& walls, const ParticleState& state,
-                    int substeps, NeighborSearch search = NeighborSearch::cells) {
+ParticleState after(const Scene& scene, const Walls& walls, const ParticleState& state, int substeps,
+                    NeighborSearch search = NeighborSearch::cells) {
   Solver solver(scene, walls, state, search);
   for (int n = 0; n < substeps; ++n) solver.substep();
   return solver.state();
@@ -47,8 +47,7 @@ TEST(FreeFall, IsThatOfSemiImplicitEulerExactly) {
     const ParticleState end = after(scene, {}, start, n);
     EXPECT_EQ(end.substep, n);
     EXPECT_EQ(Vec3(end.velocity), Vec3(0.5, 0, 0.25 - 8 * n * dt));
-    EXPECT_EQ(Vec3(end.position),
-              Vec3(0.25 + 0.5 * n * dt, 0.5, 0.75 + 0.25 * n * dt - 8 * dt * dt * n * (n + 1) / 2));
+    EXPECT_EQ(Vec3(end.position), Vec3(0.25 + 0.5 * n * dt, 0.5, 0.75 + 0.25 * n * dt - 8 * dt * dt * n * (n + 1) / 2));
   }
 }
 
@@ -82,9 +81,7 @@ TEST(Floor, SlowsASlideByFrictionTimesTheImpulseUntilItRests) {
   const ParticleState start = state_of(Vec3(0, 0, scene.contact_distance()), Vec3(0.6, -0.8, 0));
   // The floor takes 8 m/s² · t, friction half of it from 1 m/s: at rest after 1/4 s.
   for (const int n : {64, 128, 255})
-    EXPECT_LT(
-        (Vec3(after(scene, {}, start, n).velocity) - (1 - 4 * n * dt) * Vec3(0.6, -0.8, 0)).norm(),
-        1e-12);
+    EXPECT_LT((Vec3(after(scene, {}, start, n).velocity) - (1 - 4 * n * dt) * Vec3(0.6, -0.8, 0)).norm(), 1e-12);
   EXPECT_LT(after(scene, {}, start, 257).velocity.norm(), 1e-12);
   EXPECT_LT(after(scene, {}, start, 400).velocity.norm(), 1e-12);
 }
@@ -146,11 +143,8 @@ TEST(Contact, LeavesWhatIsFarOrParts) {
 TEST(Contact, PushesOutOfTwoWallsThatMeetInOneSubstep) {
   Scene scene = open_scene();
   scene.gravity.setZero();
-  scene.containers = {{"tank",
-                       tank_shape(Vec3(0.2, 0.1, 0.3), 0.04, {{{}, {}, {false, true}}}),
-                       Vec3::Zero(),
-                       0.04,
-                       {}}};
+  scene.containers = {
+      {"tank", tank_shape(Vec3(0.2, 0.1, 0.3), 0.04, {{{}, {}, {false, true}}}), Vec3::Zero(), 0.04, {}}};
   const Walls no_particles{{{Eigen::Matrix3Xd(3, 0)}}};
   const ParticleState start = state_of(Vec3(0.003, 0.05, 0.0035), Vec3(-2, 0.5, -3));
   const ParticleState end = after(scene, no_particles, start, 1);
@@ -184,10 +178,8 @@ TEST(MovingWalls, SweepAlongWhatTheyMeet) {
   // A wall 4 cm thick turns about the z axis at up to 3 rad/s into a row of resting particles.
   Scene scene = open_scene();
   scene.gravity.setZero();
-  const BoxShape wall{
-      {Vec3(0, 0, 0), Vec3(0.5, 0.1, 0.1)}, {{Vec3(0, -0.04, -0.1), Vec3(0.5, 0, 0.1)}}, {}};
-  scene.containers = {
-      {"wall", wall, Vec3::Zero(), 0.04, Tilt{Vec3::Zero(), Vec3::UnitZ(), {{0, 0}, {1, 2}}}}};
+  const BoxShape wall{{Vec3(0, 0, 0), Vec3(0.5, 0.1, 0.1)}, {{Vec3(0, -0.04, -0.1), Vec3(0.5, 0, 0.1)}}, {}};
+  scene.containers = {{"wall", wall, Vec3::Zero(), 0.04, Tilt{Vec3::Zero(), Vec3::UnitZ(), {{0, 0}, {1, 2}}}}};
   const Walls no_particles{{{Eigen::Matrix3Xd(3, 0)}}};
   ParticleState state = state_of(Eigen::Matrix3Xd::Zero(3, 8), Eigen::Matrix3Xd::Zero(3, 8));
   for (int i = 0; i < 8; ++i) state.position.col(i) = Vec3(0.05 + 0.04 * i, 0.05, 0);
@@ -221,8 +213,8 @@ TEST(PeriodicAxes, WrapPositionsAndLeaveVelocitiesAlone) {
   for (int n = 1; n <= 300; ++n) {
     state = after(scene, {}, state, 1);
     EXPECT_EQ(state.velocity, v);
-    const Eigen::Matrix3Xd turns = scene.domain.max.cwiseMax(0).cwiseInverse().asDiagonal() *
-                                   (x + n * dt * v - state.position);
+    const Eigen::Matrix3Xd turns =
+        scene.domain.max.cwiseMax(0).cwiseInverse().asDiagonal() * (x + n * dt * v - state.position);
     for (int i = 0; i < 2; ++i) {
       EXPECT_GE(state.position(0, i), -0.25);
       EXPECT_LT(state.position(0, i), 0.25);
@@ -251,8 +243,7 @@ TEST(Solver, GivesTheSameBitsWithEitherSearch) {
   const Scene scene = pour_scene();
   const Walls walls = sample_walls(scene);
   const ParticleState by_cells = after(scene, walls, initial_state(scene), 40);
-  const ParticleState by_pairs =
-      after(scene, walls, initial_state(scene), 40, NeighborSearch::all_pairs);
+  const ParticleState by_pairs = after(scene, walls, initial_state(scene), 40, NeighborSearch::all_pairs);
   EXPECT_EQ(by_cells.position, by_pairs.position);
   EXPECT_EQ(by_cells.velocity, by_pairs.velocity);
 }

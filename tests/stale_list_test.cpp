@@ -1,8 +1,8 @@
 /// \file
 /// Stale lists: what is missed is counted right, nothing is missed where the bound says so, and errors
 /// grow with the powers that the kernels' edges give them.
-#include "oracle/list_theory.hpp"
 #include "oracle/stale_list.hpp"
+#include "oracle/list_theory.hpp"
 #include "tests/random_scene.hpp"
 #include "tools/drift/power_fit.hpp"
 
@@ -15,10 +15,7 @@ namespace {
 
 struct Problem {
   explicit Problem(const Fixture& f)
-      : scene(f.scene),
-        walls(sample_walls(f.scene)),
-        volumes(wall_answer(f.scene, walls)),
-        state(f.state) {}
+      : scene(f.scene), walls(sample_walls(f.scene)), volumes(wall_answer(f.scene, walls)), state(f.state) {}
 
   Instant look() const { return look_at(scene, walls, volumes, state); }
   StaleList list(double skin) const { return {scene, volumes.volume, look(), skin}; }
@@ -143,8 +140,7 @@ TEST_P(DeficitGrowth, HasThePowersOfTheKernelsEdge) {
   Problem p = gas(GetParam());
   const double H = p.scene.support_radius();
   const StaleList list = p.list(0);
-  const Eigen::Matrix3Xd start = p.state.position,
-                         direction = random_steps(p.state.size(), 1, 9);
+  const Eigen::Matrix3Xd start = p.state.position, direction = random_steps(p.state.size(), 1, 9);
   std::array<Staleness, 2> s;
   constexpr double small = 0.02, large = 0.08;
   for (int k = 0; k < 2; ++k) {
@@ -209,8 +205,7 @@ TEST_P(DeficitGrowth, IsWhatTheoryExpectsFromSpeedsAlone) {
     for (double& x : p.state.position.reshaped()) x -= 0.2 * std::floor(x / 0.2);
     const Staleness s = list.at(p.look());
     const ExpectedDrift expected = expected_drift(p.scene, near, seconds, skin);
-    const double missed =
-        static_cast<double>(s.fluid.missed) / static_cast<double>(s.fluid.within);
+    const double missed = static_cast<double>(s.fluid.missed) / static_cast<double>(s.fluid.within);
     EXPECT_NEAR(expected.missed_share / missed, 1, 0.1) << skin;
     EXPECT_NEAR(expected.density_rms / s.density.relative_rms, 1, 0.2) << skin;
     EXPECT_NEAR(expected.acceleration_rms / s.acceleration.relative_rms, 1, 0.35) << skin;
@@ -248,8 +243,7 @@ TEST(PowerFit, FindsThePowerAndHowSureItIs) {
     xx += x * x;
   }
   const PowerFit fit = fit_power(points);
-  for (int k = 0; k < 10; ++k)
-    rest += std::pow((2 - fit.power) * (k - 4.5) + (k % 2 ? 0.1 : -0.1), 2);
+  for (int k = 0; k < 10; ++k) rest += std::pow((2 - fit.power) * (k - 4.5) + (k % 2 ? 0.1 : -0.1), 2);
   EXPECT_NEAR(fit.confidence, 2.306 * std::sqrt(rest / 8 / xx), 1e-3 * fit.confidence);
 }
 

@@ -1,8 +1,8 @@
 /// \file
 /// The check `status` sees every report that is not made, or made wrongly.
+#include "oracle/status_check.hpp"
 #include "oracle/conform.hpp"
 #include "oracle/reference_backend.hpp"
-#include "oracle/status_check.hpp"
 #include "tests/random_scene.hpp"
 
 #include <gtest/gtest.h>
@@ -24,9 +24,7 @@ class Reporter : public Backend {
     scene_ = scene;
     inner_->load(scene, walls, state);
   }
-  Status evaluate(Fields& out, const StageInputs* given) override {
-    return edited(inner_->evaluate(out, given));
-  }
+  Status evaluate(Fields& out, const StageInputs* given) override { return edited(inner_->evaluate(out, given)); }
   Status advance(int substeps) override { return edited(inner_->advance(substeps)); }
   void read(ParticleState& out) const override { inner_->read(out); }
   StageTimes stage_times() const override { return {}; }
@@ -73,8 +71,7 @@ TEST(StatusCheck, SeesEachFaceThatIsNotWatched) {
                         [&](const Status& s, const ParticleState& state, const Scene& its) {
                           if (!(s.bits & Status::escaped)) return s;
                           const double x = state.position(axis, s.particle);
-                          return (upper ? x > its.domain.max[axis] : x < its.domain.min[axis]) ? Status{}
-                                                                                               : s;
+                          return (upper ? x > its.domain.max[axis] : x < its.domain.min[axis]) ? Status{} : s;
                         }),
                 Names{"escaped"});
 }

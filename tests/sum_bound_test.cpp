@@ -70,9 +70,7 @@ TEST(SumBound, OfDifferentTermsGrowsAsTheRootOfTheirNumber) {
 /// Whatever the terms, and whatever the order: by size, up and down, at random, in pairs.
 TEST(SumBound, IsExceededByNoOrder) {
   std::mt19937 random(2);
-  const auto real = [&](double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(random);
-  };
+  const auto real = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
   double worst = 0;
   for (int k = 0; k < 20000; ++k) {
     std::vector<float> terms;
@@ -107,9 +105,7 @@ TEST(SumBound, IsExceededByNoOrder) {
   EXPECT_GT(worst, 0.5) << "a bound that is never approached is too loose";
 }
 
-TEST(SumBound, OfANumberThatIsNoneIsNone) {
-  EXPECT_TRUE(std::isnan(bound({1.0f, std::nanf("")})));
-}
+TEST(SumBound, OfANumberThatIsNoneIsNone) { EXPECT_TRUE(std::isnan(bound({1.0f, std::nanf("")}))); }
 
 }  // namespace
 }  // namespace decant

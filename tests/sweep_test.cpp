@@ -17,14 +17,10 @@
 namespace decant {
 namespace {
 
-Container cup_at(const Vec3& origin) {
-  return {"cup", cup_shape(0.02, 0.03, 0.009), origin, 0.009, {}};
-}
+Container cup_at(const Vec3& origin) { return {"cup", cup_shape(0.02, 0.03, 0.009), origin, 0.009, {}}; }
 
 // Drawn by rapidcheck, inside a property.
-double real(double low, double high) {
-  return low + (high - low) * *rc::gen::inRange(0, 1001) / 1000.0;
-}
+double real(double low, double high) { return low + (high - low) * *rc::gen::inRange(0, 1001) / 1000.0; }
 bool coin() { return *rc::gen::arbitrary<bool>(); }
 
 /// The least distance over dense surfaces and many times: never below the true one.
@@ -44,8 +40,7 @@ TEST(ClosestApproach, IsNeverMoreThanItsSlackAboveWhatSamplingFinds) {
   EXPECT_TRUE(rc::check("branch and bound against sampling", [] {
     Container a = cup_at({real(-0.1, 0.1), real(-0.05, 0.05), real(0, 0.1)});
     Container b = cup_at({0.05, 0, 0.05});
-    if (coin())
-      b.shape = tank_shape({0.05, 0.03, 0.04}, 0.01, {{{true, false}, {}, {}}});
+    if (coin()) b.shape = tank_shape({0.05, 0.03, 0.04}, 0.01, {{{true, false}, {}, {}}});
     for (Container* c : {&a, &b}) {
       if (coin()) {
         c->tilt = Tilt{{real(-0.1, 0.1), 0, 0.05},
@@ -63,8 +58,7 @@ TEST(ClosestApproach, IsNeverMoreThanItsSlackAboveWhatSamplingFinds) {
     const double slack = 1e-3, end = 1.0;
     // Sampled points are true ones, so the least distance is not above theirs; and it is not below
     // by more than their spacing and the way between two times.
-    const double sampled =
-        std::min(sampled_approach(a, b, end, 0.012), sampled_approach(b, a, end, 0.012));
+    const double sampled = std::min(sampled_approach(a, b, end, 0.012), sampled_approach(b, a, end, 0.012));
     const double found = closest_approach(a, b, end, 1.0, slack).distance;
     RC_ASSERT(found <= sampled + slack);
     RC_ASSERT(found >= sampled - 0.035);
@@ -123,8 +117,7 @@ TEST(FastestPoint, OfAPistonIsThreeHalvesOfItsMeanSpeed) {
   piston.translation.emplace().keys = {{1, Vec3::Zero()}, {3, Vec3(0, 3, 4)}};
   EXPECT_DOUBLE_EQ(fastest_point(solid_rings(piston), piston), 1.5 * 5 / 2);
   piston.translation->oscillation = {Vec3(0.3, 0, 0.4), 2};
-  EXPECT_DOUBLE_EQ(fastest_point(solid_rings(piston), piston),
-                   1.5 * 5 / 2 + 2 * std::numbers::pi * 2 * 0.5);
+  EXPECT_DOUBLE_EQ(fastest_point(solid_rings(piston), piston), 1.5 * 5 / 2 + 2 * std::numbers::pi * 2 * 0.5);
 }
 
 }  // namespace

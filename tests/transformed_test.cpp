@@ -42,8 +42,7 @@ TEST(Transformed, MoveAndTurnWhateverContainersDo) {
   for (const double t : {0.0, 0.3, 0.7}) {
     const Pose pose = pose_at(f.scene.containers[0], t);
     const Vec3 x = pose.to_world(local), v = pose.velocity_at(x);
-    const Pose moved = pose_at(problems[1].scene.containers[0], t),
-               round = pose_at(problems[2].scene.containers[0], t);
+    const Pose moved = pose_at(problems[1].scene.containers[0], t), round = pose_at(problems[2].scene.containers[0], t);
     EXPECT_LT((moved.to_world(local) - x - way).norm(), 1e-14);
     EXPECT_LT((moved.velocity_at(x + way) - v).norm(), 1e-14);
     EXPECT_LT((round.to_world(turned(local)) - turned(x)).norm(), 1e-14);
@@ -68,8 +67,7 @@ TEST(Checks, AreMadeWhereTheyAreChosenAndNowhereElse) {
   const Judgement oracle = prepare(f, {"conservation"});
   EXPECT_TRUE(oracle.transformed.empty());
   const auto backend = make_backend("hash", Executor::host, "");
-  for (const CheckRow& row : judge(*backend, f, oracle, {"conservation"}))
-    EXPECT_EQ(row.check, "conservation");
+  for (const CheckRow& row : judge(*backend, f, oracle, {"conservation"})) EXPECT_EQ(row.check, "conservation");
 }
 
 }  // namespace

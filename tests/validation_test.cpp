@@ -74,8 +74,7 @@ TEST(ExactSolutions, CupResidualHasThePublishedVolumes) {
   const double expected[][2] = {{0, 346.36},  {15, 310.27}, {30, 268.59}, {45, 211.67},
                                 {60, 123.13}, {75, 43.86},  {85, 8.66}};
   for (const auto& [degrees, volume] : expected)
-    EXPECT_NEAR(1e6 * cup_residual(0.035, 0.09, degrees * std::numbers::pi / 180), volume, 0.006)
-        << degrees;
+    EXPECT_NEAR(1e6 * cup_residual(0.035, 0.09, degrees * std::numbers::pi / 180), volume, 0.006) << degrees;
 }
 
 TEST(ExactSolutions, DropHasMonaghansAxes) {
@@ -94,10 +93,8 @@ TEST(ExactSolutions, ChannelSeriesSolveTheirEquation) {
         const double curvature = (u(z + d, t) - 2 * u(z, t) + u(z - d, t)) / (d * d);
         return std::abs(rate - nu * curvature - force);
       };
-      EXPECT_LT(residual([&](double y, double s) { return couette_velocity(V, nu, L, y, s); }, 0),
-                1e-4);
-      EXPECT_LT(residual([&](double y, double s) { return poiseuille_velocity(F, nu, L, y, s); }, F),
-                1e-4);
+      EXPECT_LT(residual([&](double y, double s) { return couette_velocity(V, nu, L, y, s); }, 0), 1e-4);
+      EXPECT_LT(residual([&](double y, double s) { return poiseuille_velocity(F, nu, L, y, s); }, F), 1e-4);
     }
   EXPECT_NEAR(couette_velocity(V, nu, L, L, 0.2), V, 1e-12);
   EXPECT_NEAR(couette_velocity(V, nu, L, 0, 0.2), 0, 1e-12);
@@ -187,9 +184,8 @@ TEST(Validation, ChannelFlowIsJudgedByItsProfile) {
       for (const double t : {0.0, 0.1, 0.3, 0.9}) {
         for (Eigen::Index i = 0; i < run.state.size(); ++i) {
           const double z = run.state.position(2, i);
-          run.state.velocity(0, i) =
-              factor * (name[0] == 'c' ? couette_velocity(0.05, 2e-4, 0.02, z, t)
-                                       : poiseuille_velocity(0.2, 2e-4, 0.02, z, t));
+          run.state.velocity(0, i) = factor * (name[0] == 'c' ? couette_velocity(0.05, 2e-4, 0.02, z, t)
+                                                              : poiseuille_velocity(0.2, 2e-4, 0.02, z, t));
         }
         run.look(t);
       }
@@ -268,8 +264,7 @@ TEST(Validation, WallPatchFeelsTheReactionToWallPressure) {
 
 TEST(Validation, WallPatchRefusesASpotWithoutWall) {
   const Scene scene = scene_of(case_named("still-tank"), 10, fixtures / "scenes");
-  EXPECT_THROW(WallPatch(scene, sample_walls(scene), {{0.02, 0.02, 0.02}, {0.03, 0.03, 0.03}},
-                         {1, 0, 0}),
+  EXPECT_THROW(WallPatch(scene, sample_walls(scene), {{0.02, 0.02, 0.02}, {0.03, 0.03, 0.03}}, {1, 0, 0}),
                std::runtime_error);
 }
 
@@ -280,8 +275,8 @@ TEST(Validation, SlitIsJudgedByItsDischarge) {
     for (int k = 0; k <= 140; ++k) {
       const double t = 0.01 * k;
       const double root = std::sqrt(0.2) - coefficient * 0.1 * std::sqrt(9.81 / 2) * t;
-      const auto left = static_cast<Eigen::Index>(
-          std::lround(root * root / 0.2 * static_cast<double>(run.state.size())));
+      const auto left =
+          static_cast<Eigen::Index>(std::lround(root * root / 0.2 * static_cast<double>(run.state.size())));
       run.state.position = start;
       run.state.position.rightCols(run.state.size() - left).row(2).setConstant(0.1);
       run.look(t);
@@ -303,9 +298,8 @@ TEST(Validation, SlowPourIsJudgedByItsResidual) {
       // Those inside turn with the cup, the others lie in the tray.
       const Pose pose = pose_at(run.scene.containers[0], to), first = pose_at(run.scene.containers[0], 0);
       for (Eigen::Index i = 0; i < run.state.size(); ++i)
-        run.state.position.col(i) =
-            i < inside ? pose.to_world(first.to_local(start.col(i)))
-                       : Vec3(-0.1 + 1e-6 * static_cast<double>(i), 0, 0.01);
+        run.state.position.col(i) = i < inside ? pose.to_world(first.to_local(start.col(i)))
+                                               : Vec3(-0.1 + 1e-6 * static_cast<double>(i), 0, 0.01);
       for (const double t : {from, to - 0.4, to - 0.2, to, to + 0.01}) run.look(t);
     }
     const auto result = run.finish();
@@ -342,8 +336,7 @@ TEST(Validation, ReportHoldsFiguresAndCurves) {
   const auto file = fs::temp_directory_path() / "decant-validation.h5";
   write_validation(file, {result});
   const Hdf5Reader in(file);
-  EXPECT_EQ(in.strings("/quantities/verdict"),
-            (std::vector<std::string>{"pass", "fail", "reported"}));
+  EXPECT_EQ(in.strings("/quantities/verdict"), (std::vector<std::string>{"pass", "fail", "reported"}));
   EXPECT_EQ(in.vector("/curves/0000/y"), Eigen::Vector2d(2, 3));
   EXPECT_EQ(in.text_attribute("/curves/0000/y", "unit"), "Pa");
   const std::string table = validation_table({result});

@@ -12,18 +12,18 @@ namespace {
 
 /// What a shell command prints, errors included.
 std::string output_of(const std::string& command) {
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(::popen(("{ " + command + "; } 2>&1").c_str(), "r"), &::pclose);
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(::popen(("{ " + command + "; } 2>&1").c_str(), "r"),
+                                                             &::pclose);
   std::string text;
   std::array<char, 4096> part;
-  while (const std::size_t size = std::fread(part.data(), 1, part.size(), pipe.get()))
-    text.append(part.data(), size);
+  while (const std::size_t size = std::fread(part.data(), 1, part.size(), pipe.get())) text.append(part.data(), size);
   return text;
 }
 
 /// What the OpenMP runtime says that it does, the last time that it says so.
 std::string policy_told(const std::string& settings) {
-  const std::string text = output_of("env -u OMP_WAIT_POLICY -u GOMP_SPINCOUNT OMP_DISPLAY_ENV=verbose " +
-                                     settings + " '" DECANT_COMMAND "' info");
+  const std::string text = output_of("env -u OMP_WAIT_POLICY -u GOMP_SPINCOUNT OMP_DISPLAY_ENV=verbose " + settings +
+                                     " '" DECANT_COMMAND "' info");
   const auto at = text.rfind("OMP_WAIT_POLICY = '");
   if (at == std::string::npos) return "not told: " + text;
   const auto begin = at + std::string("OMP_WAIT_POLICY = '").size();
@@ -34,16 +34,16 @@ TEST(WaitPolicy, OfTheCommandIsPassiveAndTheRuntimeKnowsIt) { EXPECT_EQ(policy_t
 
 TEST(WaitPolicy, IsLeftToAUserWhoSetsIt) {
   EXPECT_EQ(policy_told("OMP_WAIT_POLICY=active"), "ACTIVE");
-  EXPECT_NE(output_of("env -u OMP_WAIT_POLICY GOMP_SPINCOUNT=1000 '" DECANT_COMMAND "' info")
-                .find("OMP_WAIT_POLICY not set"),
-            std::string::npos);
+  EXPECT_NE(
+      output_of("env -u OMP_WAIT_POLICY GOMP_SPINCOUNT=1000 '" DECANT_COMMAND "' info").find("OMP_WAIT_POLICY not set"),
+      std::string::npos);
 }
 
 TEST(WaitPolicy, ComesWithTheSameArgumentsAndExitStatus) {
-  EXPECT_NE(output_of("env -u OMP_WAIT_POLICY '" DECANT_COMMAND "' info --json").find("\"omp_wait_policy\": \"passive\""),
-            std::string::npos);
-  EXPECT_NE(output_of("env -u OMP_WAIT_POLICY '" DECANT_COMMAND "' pour /nowhere.json --out x; echo =$?")
-                .find("=2"),
+  EXPECT_NE(
+      output_of("env -u OMP_WAIT_POLICY '" DECANT_COMMAND "' info --json").find("\"omp_wait_policy\": \"passive\""),
+      std::string::npos);
+  EXPECT_NE(output_of("env -u OMP_WAIT_POLICY '" DECANT_COMMAND "' pour /nowhere.json --out x; echo =$?").find("=2"),
             std::string::npos);
 }
 

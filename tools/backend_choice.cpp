@@ -25,8 +25,7 @@ std::string flag_of(std::string key) {
 }
 
 Executor executor_of(const std::string& name) {
-  if (name != "auto" && name != "cuda" && name != "host")
-    refuse("--executor", name, "must be auto, cuda or host");
+  if (name != "auto" && name != "cuda" && name != "host") refuse("--executor", name, "must be auto, cuda or host");
   if (name == "host") return Executor::host;
   std::string why_not;
   if (executor_available(Executor::cuda, &why_not)) return Executor::cuda;
@@ -62,8 +61,7 @@ std::string BackendFlags::applied_to(const std::string& choice) {
 void BackendFlags::require_used() const {
   for (const gpu::OptionDescription& option : gpu::option_descriptions())
     if (given.count(option.key) && !used_.count(option.key))
-      refuse(flag_of(option.key).c_str(), given.at(option.key),
-             std::string("only with --backend ") + option.backends);
+      refuse(flag_of(option.key).c_str(), given.at(option.key), std::string("only with --backend ") + option.backends);
 }
 
 std::vector<std::string> backend_choices() {
@@ -82,10 +80,8 @@ std::unique_ptr<Backend> choose_backend(const std::string& choice, const std::st
   if (name != "reference") return make_backend(name, executor_of(executor), options);
   if (executor == "cuda") refuse("--executor", executor, "the reference runs on the host only");
   if (executor != "auto" && executor != "host") (void)executor_of(executor);
-  if (!options.empty() && options != "all-pairs")
-    refuse("--backend", choice, "reference or reference:all-pairs");
-  return make_reference_backend(options.empty() ? NeighborSearch::cells
-                                                : NeighborSearch::all_pairs);
+  if (!options.empty() && options != "all-pairs") refuse("--backend", choice, "reference or reference:all-pairs");
+  return make_reference_backend(options.empty() ? NeighborSearch::cells : NeighborSearch::all_pairs);
 }
 
 }  // namespace decant

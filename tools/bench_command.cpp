@@ -146,14 +146,11 @@ std::string objection(Backend& backend, const Fixture& fixture, const Judgement&
   return {};
 }
 
-BenchRow time_backend(Backend& backend, const Fixture& fixture, const Walls& walls,
-                      const BenchArguments& arguments) {
+BenchRow time_backend(Backend& backend, const Fixture& fixture, const Walls& walls, const BenchArguments& arguments) {
   std::vector<Window> windows;
   for (int w = 0; w < arguments.windows; ++w)
     windows.push_back(run_window(backend, fixture, walls, arguments.substeps));
-  const auto substep_us = [](const Window& w) {
-    return 1e6 * w.seconds / static_cast<double>(w.substeps);
-  };
+  const auto substep_us = [](const Window& w) { return 1e6 * w.seconds / static_cast<double>(w.substeps); };
   std::sort(windows.begin(), windows.end(),
             [&](const Window& a, const Window& b) { return substep_us(a) < substep_us(b); });
   const Window& middle = windows[windows.size() / 2];
@@ -177,8 +174,7 @@ BenchRow time_backend(Backend& backend, const Fixture& fixture, const Walls& wal
   // Not every substep of a list builds.
   const double substeps = static_cast<double>(middle.substeps);
   const double builds = middle.rebuilds > 0 ? static_cast<double>(middle.rebuilds) / substeps : 1;
-  row.stages_us = {builds * each_us(s.build), each_us(s.density), each_us(s.force),
-                   each_us(s.integrate), 0};
+  row.stages_us = {builds * each_us(s.build), each_us(s.density), each_us(s.force), each_us(s.integrate), 0};
   double named = 0;
   for (const double stage : row.stages_us) named += stage;
   row.stages_us.back() = std::max(0.0, row.substep_us - named);
@@ -187,10 +183,10 @@ BenchRow time_backend(Backend& backend, const Fixture& fixture, const Walls& wal
   backend.load(fixture.scene, walls, fixture.state);
   Fields fields = Fields::unwritten(fixture.state.size(), walls.size());
   require_ok(backend, backend.evaluate(fields));
-  row.neighbors_mean = fields.fluid_neighbor_count.cast<double>().mean() +
-                       fields.wall_neighbor_count.cast<double>().mean();
-  row.device_bytes_per_particle = static_cast<double>(backend.neighbor_stats().device_bytes) /
-                                  static_cast<double>(fixture.state.size());
+  row.neighbors_mean =
+      fields.fluid_neighbor_count.cast<double>().mean() + fields.wall_neighbor_count.cast<double>().mean();
+  row.device_bytes_per_particle =
+      static_cast<double>(backend.neighbor_stats().device_bytes) / static_cast<double>(fixture.state.size());
   return row;
 }
 
@@ -288,8 +284,7 @@ void add_bench_command(CLI::App& app, int& exit_status) {
   verb->add_option("--windows", arguments->windows, "windows to take the median of")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  verb->add_option("--refine", arguments->refine, "eight particles for one, so many times")
-      ->check(CLI::Range(0, 4));
+  verb->add_option("--refine", arguments->refine, "eight particles for one, so many times")->check(CLI::Range(0, 4));
   verb->add_option("--json", arguments->json, "write rows as JSON");
   verb->add_option("--report", arguments->report, "write rows as HDF5");
   verb->callback([arguments, &exit_status] { exit_status = bench(*arguments); });

@@ -13,20 +13,18 @@ namespace decant {
 namespace {
 
 const std::vector<std::pair<const char*, const char*>>& provenance() {
-  static const std::vector<std::pair<const char*, const char*>> all = {
-      {"version", version},
-      {"git_revision", git_revision},
-      {"compiler", compiler},
-      {"flags", flags},
-      {"build_type", build_type}};
+  static const std::vector<std::pair<const char*, const char*>> all = {{"version", version},
+                                                                       {"git_revision", git_revision},
+                                                                       {"compiler", compiler},
+                                                                       {"flags", flags},
+                                                                       {"build_type", build_type}};
   return all;
 }
 
 nlohmann::ordered_json to_json(const BenchRow& row) {
   nlohmann::ordered_json stages = nullptr;
   if (row.tells_stages)
-    for (std::size_t s = 0; s < bench_stage_names.size(); ++s)
-      stages[bench_stage_names[s]] = row.stages_us[s];
+    for (std::size_t s = 0; s < bench_stage_names.size(); ++s) stages[bench_stage_names[s]] = row.stages_us[s];
   return {{"backend", row.backend},
           {"options", row.options},
           {"executor", row.executor},
@@ -53,9 +51,8 @@ std::string backend_label(const std::string& name, const std::string& options) {
 }
 
 std::string bench_heading() {
-  return fmt::format("{:<28} {:<9} {:>9} {:<10} {:>11} {:>9} {:>8} {:>7}  {}", "backend", "executor",
-                     "particles", "window", "us/substep", "particle", "rebuilt", "bytes",
-                     "us by stage") +
+  return fmt::format("{:<28} {:<9} {:>9} {:<10} {:>11} {:>9} {:>8} {:>7}  {}", "backend", "executor", "particles",
+                     "window", "us/substep", "particle", "rebuilt", "bytes", "us by stage") +
          fmt::format("\n{:<60} {:>10} {:>9} {:>8} {:>7}", "", "", "substeps/s", "every", "each");
 }
 
@@ -64,19 +61,14 @@ std::string to_text(const BenchRow& row) {
   if (row.tells_stages)
     for (std::size_t s = 0; s < bench_stage_names.size(); ++s)
       stages += fmt::format(" {} {:.1f}", bench_stage_names[s], row.stages_us[s]);
-  return fmt::format("{:<28} {:<9} {:>9} {:<10} {:>11.2f} {:>9.3g} {:>8} {:>7} {}",
-                     backend_label(row.backend, row.options), row.executor,
-                     row.particles, row.window, row.substep_us, row.particle_substeps_per_s(),
-                     row.substeps_per_rebuild > 0 ? fmt::format("{:.2f}", row.substeps_per_rebuild)
-                                                  : "-",
-                     row.device_bytes_per_particle > 0
-                         ? fmt::format("{:.0f}", row.device_bytes_per_particle)
-                         : "-",
-                     stages);
+  return fmt::format(
+      "{:<28} {:<9} {:>9} {:<10} {:>11.2f} {:>9.3g} {:>8} {:>7} {}", backend_label(row.backend, row.options),
+      row.executor, row.particles, row.window, row.substep_us, row.particle_substeps_per_s(),
+      row.substeps_per_rebuild > 0 ? fmt::format("{:.2f}", row.substeps_per_rebuild) : "-",
+      row.device_bytes_per_particle > 0 ? fmt::format("{:.0f}", row.device_bytes_per_particle) : "-", stages);
 }
 
-void write_bench_json(const std::string& file, const std::vector<BenchRow>& rows,
-                      const std::string& interrupted) {
+void write_bench_json(const std::string& file, const std::vector<BenchRow>& rows, const std::string& interrupted) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array(), made_by;
   for (const BenchRow& row : rows) list.push_back(to_json(row));
   for (const auto& [key, value] : provenance()) made_by[key] = value;
@@ -85,8 +77,7 @@ void write_bench_json(const std::string& file, const std::vector<BenchRow>& rows
   write_text_file(file, all.dump(2) + '\n');
 }
 
-void write_bench_hdf5(const std::string& file, const std::vector<BenchRow>& rows,
-                      const std::string& interrupted) {
+void write_bench_hdf5(const std::string& file, const std::vector<BenchRow>& rows, const std::string& interrupted) {
   Hdf5Writer out(file);
   out.attribute("/", "decant_bench", 1);
   if (!interrupted.empty()) out.attribute("/", "interrupted", interrupted);
@@ -96,8 +87,7 @@ void write_bench_hdf5(const std::string& file, const std::vector<BenchRow>& rows
     for (const BenchRow& row : rows) values.push_back(get(row));
     out.strings(std::string("/rows/") + name, values, description);
   };
-  const auto real = [&](const std::string& name, auto get, const char* unit,
-                        const char* description) {
+  const auto real = [&](const std::string& name, auto get, const char* unit, const char* description) {
     Eigen::VectorXd values(n);
     for (Eigen::Index k = 0; k < n; ++k) values[k] = get(rows[static_cast<std::size_t>(k)]);
     out.vector("/rows/" + name, values, unit, description);
@@ -115,23 +105,23 @@ void write_bench_hdf5(const std::string& file, const std::vector<BenchRow>& rows
   whole("particles", [](const BenchRow& r) { return r.particles; }, "fluid");
   whole("wall_particles", [](const BenchRow& r) { return r.wall_particles; }, "of all containers");
   whole("substeps", [](const BenchRow& r) { return r.substeps; }, "in a window");
-  whole("conformant", [](const BenchRow& r) { return std::int64_t{r.conformant}; },
-        "1: judged on the state and passed");
+  whole(
+      "conformant", [](const BenchRow& r) { return std::int64_t{r.conformant}; }, "1: judged on the state and passed");
   real("substep_us", [](const BenchRow& r) { return r.substep_us; }, "us", "median window");
   real("fastest_us", [](const BenchRow& r) { return r.fastest_us; }, "us", "fastest window");
   real("slowest_us", [](const BenchRow& r) { return r.slowest_us; }, "us", "slowest window");
   for (std::size_t s = 0; s < bench_stage_names.size(); ++s)
-    real(std::string("stage_") + bench_stage_names[s] + "_us",
-         [s](const BenchRow& r) { return r.tells_stages ? r.stages_us[s] : std::nan(""); }, "us",
-         "share of a substep; NaN: not told");
-  real("neighbors_mean", [](const BenchRow& r) { return r.neighbors_mean; }, "1",
-       "fluid and wall neighbors a particle");
-  real("interactions_per_s", [](const BenchRow& r) { return r.interactions_per_s(); }, "1/s",
-       "neighbors found in a second");
-  real("substeps_per_rebuild", [](const BenchRow& r) { return r.substeps_per_rebuild; }, "1",
-       "0: not told");
-  real("device_bytes_per_particle", [](const BenchRow& r) { return r.device_bytes_per_particle; },
-       "B", "0: not told");
+    real(
+        std::string("stage_") + bench_stage_names[s] + "_us",
+        [s](const BenchRow& r) { return r.tells_stages ? r.stages_us[s] : std::nan(""); }, "us",
+        "share of a substep; NaN: not told");
+  real(
+      "neighbors_mean", [](const BenchRow& r) { return r.neighbors_mean; }, "1", "fluid and wall neighbors a particle");
+  real(
+      "interactions_per_s", [](const BenchRow& r) { return r.interactions_per_s(); }, "1/s",
+      "neighbors found in a second");
+  real("substeps_per_rebuild", [](const BenchRow& r) { return r.substeps_per_rebuild; }, "1", "0: not told");
+  real("device_bytes_per_particle", [](const BenchRow& r) { return r.device_bytes_per_particle; }, "B", "0: not told");
   for (const auto& [key, value] : provenance()) out.attribute("/provenance", key, value);
   out.commit();
 }

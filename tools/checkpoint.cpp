@@ -89,40 +89,34 @@ Checkpoint read_checkpoint(const std::filesystem::path& file) {
   Checkpoint c;
   c.frame = in.integer_attribute("/", "frame");
   c.choices.csv = in.integer_attribute("/", "csv") != 0;
-  c.choices.perturbation =
-      static_cast<std::uint32_t>(in.integer_attribute("/", "perturbation"));
+  c.choices.perturbation = static_cast<std::uint32_t>(in.integer_attribute("/", "perturbation"));
   c.wall_seconds = in.real_attribute("/", "wall_seconds");
   c.scene_json = in.text("/scene");
-  c.backend = {in.text_attribute("/", "backend"), in.text_attribute("/", "options"),
-               in.text_attribute("/", "executor"), in.text_attribute("/", "device"),
-               in.text_attribute("/", "precision")};
+  c.backend = {in.text_attribute("/", "backend"), in.text_attribute("/", "options"), in.text_attribute("/", "executor"),
+               in.text_attribute("/", "device"), in.text_attribute("/", "precision")};
   c.state.substep = in.integer_attribute("/", "substep");
   c.state.position = in.matrix3("/state/position");
   c.state.velocity = in.matrix3("/state/velocity", c.state.size());
   c.timeline = Timeline::read(in, "/timeline");
   const std::string sha = in.text_attribute("/", "scene_sha256");
-  if (sha != sha256_of_text(c.scene_json))
-    in.fail("scene_sha256", sha, "must be the digest of /scene");
+  if (sha != sha256_of_text(c.scene_json)) in.fail("scene_sha256", sha, "must be the digest of /scene");
   if (static_cast<std::int64_t>(c.timeline.rows.size()) != c.frame + 1)
-    in.fail("/timeline/time", fmt::format("{} rows", c.timeline.rows.size()),
-            fmt::format("must have {}", c.frame + 1));
+    in.fail("/timeline/time", fmt::format("{} rows", c.timeline.rows.size()), fmt::format("must have {}", c.frame + 1));
   if (in.has("/part/looked_at")) c.part = read_part(in, c.state.size());
   return c;
 }
 
-void check_same_pour(const std::filesystem::path& file, const Checkpoint& checkpoint,
-                     const Scene& scene, const BackendInfo& backend, const PourChoices& choices) {
+void check_same_pour(const std::filesystem::path& file, const Checkpoint& checkpoint, const Scene& scene,
+                     const BackendInfo& backend, const PourChoices& choices) {
   const auto refuse = [&](const std::string& key, const std::string& now, const std::string& then) {
     throw InputError(file.string(), key, now, "the pour to resume was started with " + then);
   };
   const std::string json = scene_to_json(scene);
   if (json != checkpoint.scene_json) {
-    const auto now = nlohmann::json::parse(json),
-               then = nlohmann::json::parse(checkpoint.scene_json);
+    const auto now = nlohmann::json::parse(json), then = nlohmann::json::parse(checkpoint.scene_json);
     const auto difference = nlohmann::json::diff(then, now);
     // The frames decide the substep too; whoever changed them wants to read about them.
-    std::string pointer =
-        difference.empty() ? "" : difference.front().at("path").get<std::string>();
+    std::string pointer = difference.empty() ? "" : difference.front().at("path").get<std::string>();
     for (const auto& change : difference)
       if (change.at("path") == "/time/frames") pointer = "/time/frames";
     refuse(key_of(pointer), value_at(now, pointer), value_at(then, pointer));
@@ -133,8 +127,7 @@ void check_same_pour(const std::filesystem::path& file, const Checkpoint& checkp
     refuse("backend options", "\"" + backend.options + "\"", "\"" + then.options + "\"");
   if (backend.executor != then.executor) refuse("--executor", backend.executor, then.executor);
   const PourChoices& chosen = checkpoint.choices;
-  if (choices.csv != chosen.csv)
-    refuse("--csv", choices.csv ? "yes" : "no", chosen.csv ? "yes" : "no");
+  if (choices.csv != chosen.csv) refuse("--csv", choices.csv ? "yes" : "no", chosen.csv ? "yes" : "no");
   if (choices.perturbation != chosen.perturbation)
     refuse("--perturb", std::to_string(choices.perturbation), std::to_string(chosen.perturbation));
 }

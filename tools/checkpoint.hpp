@@ -22,7 +22,7 @@ inline constexpr std::int64_t checkpoint_schema = 2;
 
 /// What is known of a frame that is not over.
 struct PartOfFrame {
-  Eigen::Matrix3Xd looked_at;          // 3×N, m, positions when the audit last looked
+  Eigen::Matrix3Xd looked_at;  // 3×N, m, positions when the audit last looked
   std::int64_t looked_at_substep = 0;
   AuditResult on_the_way;              // the worst of the looks since the frame before; no places
   std::int64_t fastest_particle = -1;  // of the largest speed among them
@@ -36,9 +36,9 @@ struct PourChoices {
 };
 
 struct Checkpoint {
-  std::int64_t frame = 0;  // frames up to it are on the disk
-  ParticleState state;     // full precision, of this frame or within the next
-  Timeline timeline;       // rows 0 … frame
+  std::int64_t frame = 0;           // frames up to it are on the disk
+  ParticleState state;              // full precision, of this frame or within the next
+  Timeline timeline;                // rows 0 … frame
   std::optional<PartOfFrame> part;  // where the state is within the next frame
   PourChoices choices;
   double wall_seconds = 0;  // s, since the start, all sessions together
@@ -54,7 +54,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& file);
 
 /// Refuses to continue what is not the same pour. Throws InputError naming file, the first key that
 /// differs, its value now and the value then. The device may differ; the caller says so.
-void check_same_pour(const std::filesystem::path& file, const Checkpoint& checkpoint,
-                     const Scene& scene, const BackendInfo& backend, const PourChoices& choices);
+void check_same_pour(const std::filesystem::path& file, const Checkpoint& checkpoint, const Scene& scene,
+                     const BackendInfo& backend, const PourChoices& choices);
 
 }  // namespace decant

@@ -89,13 +89,11 @@ std::vector<Candidate> candidates_of(ConformArguments& arguments) {
     names = backend_choices();
     std::erase(names, "reference");
   }
-  if (names.empty())
-    throw InputError("command line", "--backend", "none", "this build has no backend under test");
+  if (names.empty()) throw InputError("command line", "--backend", "none", "this build has no backend under test");
   std::set<std::string> seen;
   std::vector<Candidate> candidates;
   for (const auto& name : names) {
-    if (!seen.insert(name).second)
-      throw InputError("command line", "--backend", name, "each backend once");
+    if (!seen.insert(name).second) throw InputError("command line", "--backend", name, "each backend once");
     candidates.push_back(candidate_of(arguments.flags.applied_to(name), arguments.executor));
   }
   arguments.flags.require_used();
@@ -106,16 +104,14 @@ std::vector<Candidate> candidates_of(ConformArguments& arguments) {
 std::vector<Fixture> fixtures_of(const ConformArguments& arguments) {
   std::vector<std::filesystem::path> files;
   for (const auto& given : arguments.fixtures) files.push_back(recording_called(given));
-  if (!files.empty() && arguments.all)
-    throw InputError("command line", "--all", "given", "either --all or FIXTURE");
+  if (!files.empty() && arguments.all) throw InputError("command line", "--all", "given", "either --all or FIXTURE");
   if (files.empty()) files = fixtures_in(fixture_folder(), arguments.all);
   std::vector<Fixture> fixtures;
   for (const auto& file : files) fixtures.push_back(read_fixture(file));
   return fixtures;
 }
 
-CheckRow row_that_did_not_run(const Candidate& candidate, const Fixture& fixture,
-                              const std::string& why) {
+CheckRow row_that_did_not_run(const Candidate& candidate, const Fixture& fixture, const std::string& why) {
   CheckRow row;
   row.backend = candidate.info.name;
   row.executor = candidate.info.executor;
@@ -127,18 +123,16 @@ CheckRow row_that_did_not_run(const Candidate& candidate, const Fixture& fixture
 }
 
 /// Adds the rows of all, pair by pair. \param judged  pairs of backend and fixture whose rows are there
-void judge_all(std::vector<Candidate>& candidates, const std::vector<Fixture>& fixtures,
-               const CheckSelection& checks, int look_every, bool quiet, Interruptible& work,
-               Report& report, std::int64_t& judged) {
+void judge_all(std::vector<Candidate>& candidates, const std::vector<Fixture>& fixtures, const CheckSelection& checks,
+               int look_every, bool quiet, Interruptible& work, Report& report, std::int64_t& judged) {
   const auto total = static_cast<std::int64_t>(candidates.size() * fixtures.size());
-  const bool any = std::any_of(candidates.begin(), candidates.end(),
-                               [](const Candidate& c) { return c.backend != nullptr; });
+  const bool any =
+      std::any_of(candidates.begin(), candidates.end(), [](const Candidate& c) { return c.backend != nullptr; });
   Progress progress("judgement", total, 0, quiet);
   // The oracle is sequential: it works on the next fixture while backends are judged on this one.
   const auto prepared = [&](std::size_t k) {
-    return std::async(std::launch::async, [&, k] {
-      return std::make_unique<const Judgement>(prepare(fixtures[k], checks, look_every));
-    });
+    return std::async(std::launch::async,
+                      [&, k] { return std::make_unique<const Judgement>(prepare(fixtures[k], checks, look_every)); });
   };
   std::future<std::unique_ptr<const Judgement>> next;
   if (any && !fixtures.empty()) next = prepared(0);
@@ -161,10 +155,9 @@ void judge_all(std::vector<Candidate>& candidates, const std::vector<Fixture>& f
       });
       for (CheckRow& row : rows) {
         if (!report.surroundings && is_located(row))
-          report.surroundings = surroundings_of(
-              fixture, oracle->walls, oracle->own.fields.density, row,
-              static_cast<std::int64_t>(report.rows.size()),
-              shown_radius * fixture.scene.support_radius());
+          report.surroundings = surroundings_of(fixture, oracle->walls, oracle->own.fields.density, row,
+                                                static_cast<std::int64_t>(report.rows.size()),
+                                                shown_radius * fixture.scene.support_radius());
         report.rows.push_back(std::move(row));
       }
       ++judged;
@@ -174,18 +167,15 @@ void judge_all(std::vector<Candidate>& candidates, const std::vector<Fixture>& f
 }
 
 /// What was asked for and is not there is in the report too.
-void add_what_was_not_judged(const std::vector<Candidate>& candidates,
-                             const std::vector<Fixture>& fixtures, std::int64_t judged,
-                             Report& report) {
+void add_what_was_not_judged(const std::vector<Candidate>& candidates, const std::vector<Fixture>& fixtures,
+                             std::int64_t judged, Report& report) {
   std::int64_t pair = 0;
   for (const Fixture& fixture : fixtures)
     for (const Candidate& candidate : candidates)
-      if (pair++ >= judged)
-        report.rows.push_back(row_that_did_not_run(candidate, fixture, "interrupted"));
+      if (pair++ >= judged) report.rows.push_back(row_that_did_not_run(candidate, fixture, "interrupted"));
 }
 
-void add_provenance(Report& report, const std::vector<Candidate>& candidates,
-                    const std::vector<Fixture>& fixtures) {
+void add_provenance(Report& report, const std::vector<Candidate>& candidates, const std::vector<Fixture>& fixtures) {
   auto& p = report.provenance;
   p.merge(build_provenance());
   for (const auto& c : candidates)
@@ -196,16 +186,14 @@ void add_provenance(Report& report, const std::vector<Candidate>& candidates,
 /// 77 where nothing fails and all that is missing is the device that was asked for.
 int status_of(const Report& report, const std::vector<Candidate>& candidates) {
   const int status = exit_status(report);
-  const bool only_the_device =
-      std::all_of(candidates.begin(), candidates.end(),
-                  [](const Candidate& c) { return c.backend || c.device_absent; });
-  const bool absent = std::any_of(candidates.begin(), candidates.end(),
-                                  [](const Candidate& c) { return c.device_absent; });
+  const bool only_the_device = std::all_of(candidates.begin(), candidates.end(),
+                                           [](const Candidate& c) { return c.backend || c.device_absent; });
+  const bool absent =
+      std::any_of(candidates.begin(), candidates.end(), [](const Candidate& c) { return c.device_absent; });
   return status == exit_failure && absent && only_the_device ? exit_device_absent : status;
 }
 
-std::string json_text(const Report& report, const std::vector<Replay>& replays,
-                      const std::string& line, int status) {
+std::string json_text(const Report& report, const std::vector<Replay>& replays, const std::string& line, int status) {
   nlohmann::ordered_json rows = nlohmann::ordered_json::array(), files = rows;
   for (const auto& r : report.rows)
     rows.push_back({{"backend", r.backend},
@@ -233,8 +221,7 @@ std::string json_text(const Report& report, const std::vector<Replay>& replays,
                     {"excluded", r.excluded},
                     {"verdict", to_string(judged_verdict(r))},
                     {"reason", judged_reason(r)}});
-  for (const auto& replay : replays)
-    files.push_back({{"row", replay.row}, {"file", replay.file.string()}});
+  for (const auto& replay : replays) files.push_back({{"row", replay.row}, {"file", replay.file.string()}});
   const nlohmann::ordered_json all = {{"summary", line},
                                       {"exit_status", status},
                                       {"rows", rows},
@@ -264,31 +251,26 @@ int explain(const std::string& name) {
   return exit_pass;
 }
 
-void write_replays(const std::vector<Replay>& replays, const Report& report,
-                   const std::vector<Fixture>& fixtures, bool talks) {
+void write_replays(const std::vector<Replay>& replays, const Report& report, const std::vector<Fixture>& fixtures,
+                   bool talks) {
   for (const Replay& replay : replays) {
     const CheckRow& row = report.rows[replay.row];
-    const auto fixture = std::find_if(fixtures.begin(), fixtures.end(),
-                                      [&](const Fixture& f) { return f.name == row.fixture; });
+    const auto fixture =
+        std::find_if(fixtures.begin(), fixtures.end(), [&](const Fixture& f) { return f.name == row.fixture; });
     std::filesystem::create_directories(replay.file.parent_path());
     std::string warning;
     const std::string line = write_replay(replay.file, *fixture, row, warning);
     if (talks) fmt::print("{}\n", line);
-    if (!warning.empty())
-      fmt::print(stderr, "warning: {}: {}\n", replay.file.string(), warning);
+    if (!warning.empty()) fmt::print(stderr, "warning: {}: {}\n", replay.file.string(), warning);
   }
 }
 
 /// Prints what was asked for and writes the report.
-int hand_over(const ConformArguments& arguments, const Report& report,
-              const std::vector<Replay>& replays, int status, const std::string& table,
-              const std::string& line) {
-  if (arguments.json)
-    fmt::print("{}\n", json_text(report, replays, line, status));
-  else if (arguments.quiet)
-    fmt::print("{}\n", line);
-  else
-    fmt::print("{}", table);
+int hand_over(const ConformArguments& arguments, const Report& report, const std::vector<Replay>& replays, int status,
+              const std::string& table, const std::string& line) {
+  if (arguments.json) fmt::print("{}\n", json_text(report, replays, line, status));
+  else if (arguments.quiet) fmt::print("{}\n", line);
+  else fmt::print("{}", table);
   std::fflush(stdout);
   // After the table: what was found out is not lost with a full disk.
   if (!arguments.report.empty()) write_report(arguments.report, report);
@@ -309,8 +291,7 @@ int conform_results(const ConformArguments& arguments) {
   arguments.flags.require_used();
   check_output_place("--report", arguments.report);
   const ResultsOutcome outcome =
-      judge_results_file({arguments.results, arguments.fixtures, arguments.oracle, arguments.name,
-                          arguments.checks});
+      judge_results_file({arguments.results, arguments.fixtures, arguments.oracle, arguments.name, arguments.checks});
   return hand_over(arguments, outcome.report, {}, outcome.status, outcome.table, outcome.line);
 }
 
@@ -319,8 +300,7 @@ int conform(ConformArguments& arguments) {
   if (arguments.list) return list_recordings();
   if (!arguments.results.empty() || !arguments.oracle.empty() || !arguments.name.empty())
     return conform_results(arguments);
-  const CheckSelection checks =
-      arguments.checks.empty() ? all_checks() : parse_checks(arguments.checks);
+  const CheckSelection checks = arguments.checks.empty() ? all_checks() : parse_checks(arguments.checks);
   check_output_place("--report", arguments.report);
   check_output_place("--junit", arguments.junit);
   check_output_folder("--reproducers", arguments.surroundings);
@@ -329,8 +309,7 @@ int conform(ConformArguments& arguments) {
   const bool talks = !arguments.quiet && !arguments.json;
   Report report;
   std::int64_t judged = 0;
-  const auto hand_over_all = [&](int status, const std::vector<Replay>& replays,
-                                 const std::string& more) {
+  const auto hand_over_all = [&](int status, const std::vector<Replay>& replays, const std::string& more) {
     add_provenance(report, candidates, fixtures);
     hand_over(arguments, report, replays, status, "\n" + console_table(report) + more,
               verdict_line(report) + (more.empty() ? "" : "\n" + more.substr(0, more.size() - 1)));
@@ -378,8 +357,7 @@ void add_conform_command(CLI::App& app, int& exit_status) {
   arguments->flags.add_to(*verb);
   verb->add_option("--results", arguments->results,
                    "judge this file's fields (oracle/formats/results.md) instead of a backend");
-  verb->add_option("--oracle", arguments->oracle,
-                   "their own reference, for --results of their own states");
+  verb->add_option("--oracle", arguments->oracle, "their own reference, for --results of their own states");
   verb->add_option("--name", arguments->name, "what the report calls --results; default: its file");
   verb->add_option("--check-every", arguments->look_every,
                    "check mass and containment every so many substeps of a run; 1 names the first "

@@ -18,14 +18,11 @@ constexpr std::int64_t bytes_per_particle = 100, bytes_per_vertex = 40;
 
 void append_points(fmt::memory_buffer& out, std::int64_t first_id, const std::vector<float>& xyz) {
   for (std::size_t p = 0; 3 * p < xyz.size(); ++p)
-    fmt::format_to(std::back_inserter(out), FMT_COMPILE("{},{},{},{}\n"),
-                   first_id + static_cast<std::int64_t>(p), xyz[3 * p], xyz[3 * p + 1],
-                   xyz[3 * p + 2]);
+    fmt::format_to(std::back_inserter(out), FMT_COMPILE("{},{},{},{}\n"), first_id + static_cast<std::int64_t>(p),
+                   xyz[3 * p], xyz[3 * p + 1], xyz[3 * p + 2]);
 }
 
-void append_text(fmt::memory_buffer& out, std::string_view text) {
-  out.append(text.data(), text.data() + text.size());
-}
+void append_text(fmt::memory_buffer& out, std::string_view text) { out.append(text.data(), text.data() + text.size()); }
 
 }  // namespace
 
@@ -37,10 +34,8 @@ CsvWriter::CsvWriter(std::filesystem::path folder, const Scene& scene, const Fra
   std::int64_t id = 0;
   for (std::size_t c = 0; c < layout.walls.size(); ++c) {
     const RenderWall& wall = layout.walls[c];
-    if (wall.moving)
-      first_id_.push_back(id);
-    else
-      append_points(text, id, posed_vertices(scene.containers.at(c), wall.surface, 0.0));
+    if (wall.moving) first_id_.push_back(id);
+    else append_points(text, id, posed_vertices(scene.containers.at(c), wall.surface, 0.0));
     id += wall.surface.vertex.cols();
   }
   write_text_file(folder_ / "boundary_static.csv", {text.data(), text.size()});
@@ -52,18 +47,15 @@ void CsvWriter::write(const Frame& frame) const {
   for (std::size_t i = 0; i < frame.density.size(); ++i) {
     const float* x = &frame.position[3 * i];
     const float* v = &frame.velocity[3 * i];
-    fmt::format_to(std::back_inserter(text), FMT_COMPILE("{},{},{},{},{},{},{},{},{}\n"), i, x[0],
-                   x[1], x[2], v[0], v[1], v[2], frame.density[i], frame.pressure[i]);
+    fmt::format_to(std::back_inserter(text), FMT_COMPILE("{},{},{},{},{},{},{},{},{}\n"), i, x[0], x[1], x[2], v[0],
+                   v[1], v[2], frame.density[i], frame.pressure[i]);
   }
-  write_text_file(folder_ / fmt::format("fluid_{:06}.csv", frame.index),
-                  {text.data(), text.size()});
+  write_text_file(folder_ / fmt::format("fluid_{:06}.csv", frame.index), {text.data(), text.size()});
   if (first_id_.empty()) return;
   text.clear();
   append_text(text, "id,x,y,z\n");
-  for (std::size_t w = 0; w < first_id_.size(); ++w)
-    append_points(text, first_id_[w], frame.wall.at(w));
-  write_text_file(folder_ / fmt::format("boundary_{:06}.csv", frame.index),
-                  {text.data(), text.size()});
+  for (std::size_t w = 0; w < first_id_.size(); ++w) append_points(text, first_id_[w], frame.wall.at(w));
+  write_text_file(folder_ / fmt::format("boundary_{:06}.csv", frame.index), {text.data(), text.size()});
 }
 
 std::int64_t csv_bytes(const FrameLayout& layout) {

@@ -97,23 +97,18 @@ int diff_pours(const DiffArguments& arguments) {
   if (!arguments.pairs.empty())
     throw InputError("command line", "--pair", arguments.pairs[0], "two reports: it pairs their backends");
   const PourDiff found =
-      pour_difference(arguments.before, arguments.after,
-                      {arguments.spread.begin(), arguments.spread.end()},
+      pour_difference(arguments.before, arguments.after, {arguments.spread.begin(), arguments.spread.end()},
                       arguments.factor > 0 ? arguments.factor : PourDiff{}.factor);
   const int status = found.within() ? exit_pass : exit_does_not_conform;
-  if (arguments.json)
-    fmt::print("{}\n", pour_diff_json(found, status));
-  else if (arguments.quiet)
-    fmt::print("{}\n", pour_diff_line(found));
-  else
-    fmt::print("{}", pour_diff_text(found));
+  if (arguments.json) fmt::print("{}\n", pour_diff_json(found, status));
+  else if (arguments.quiet) fmt::print("{}\n", pour_diff_line(found));
+  else fmt::print("{}", pour_diff_text(found));
   return status;
 }
 
 int diff_reports(const DiffArguments& arguments) {
   if (!arguments.spread.empty())
-    throw InputError("command line", "--spread", arguments.spread[0],
-                     "two pours: reports have no spread");
+    throw InputError("command line", "--spread", arguments.spread[0], "two pours: reports have no spread");
   Report before = read_report(arguments.before), after = read_report(arguments.after);
   for (const std::string& pair : arguments.pairs) {
     const auto equals = pair.find('=');
@@ -128,18 +123,15 @@ int diff_reports(const DiffArguments& arguments) {
       return std::find(new_names.begin(), new_names.end(), name) != new_names.end();
     });
     if (!shared)
-      throw InputError(arguments.after, "backends", fmt::format("{}", fmt::join(new_names, ", ")),
-                       fmt::format("those of {} ({}), or --pair \"{}={}\" to compare one with another",
-                                   arguments.before, fmt::join(old_names, ", "),
-                                   before.rows[0].backend, after.rows[0].backend));
+      throw InputError(
+          arguments.after, "backends", fmt::format("{}", fmt::join(new_names, ", ")),
+          fmt::format("those of {} ({}), or --pair \"{}={}\" to compare one with another", arguments.before,
+                      fmt::join(old_names, ", "), before.rows[0].backend, after.rows[0].backend));
   }
   const int status = found.got_worse() ? exit_does_not_conform : exit_pass;
-  if (arguments.json)
-    fmt::print("{}\n", json_text(found, status));
-  else if (arguments.quiet)
-    fmt::print("{}\n", diff_line(found));
-  else
-    fmt::print("{}", diff_text(found));
+  if (arguments.json) fmt::print("{}\n", json_text(found, status));
+  else if (arguments.quiet) fmt::print("{}\n", diff_line(found));
+  else fmt::print("{}", diff_text(found));
   return status;
 }
 
@@ -151,8 +143,7 @@ int diff(const DiffArguments& arguments) {
   const bool before = is_pour(arguments.before), after = is_pour(arguments.after);
   if (before != after)
     throw InputError(before ? arguments.after : arguments.before, "kind", "no pour",
-                     fmt::format("a pour, as {} is; or two reports",
-                                 before ? arguments.before : arguments.after));
+                     fmt::format("a pour, as {} is; or two reports", before ? arguments.before : arguments.after));
   return before ? diff_pours(arguments) : diff_reports(arguments);
 }
 
@@ -165,8 +156,7 @@ void add_diff_command(CLI::App& app, int& exit_status) {
   verb->add_option("BEFORE", arguments->before, "report (*.h5), or a pour's folder")->required();
   verb->add_option("AFTER", arguments->after, "another of the same kind")->required();
   verb->add_option("--spread", arguments->spread, "pours: more of them, from disturbed starts");
-  verb->add_option("--pair", arguments->pairs,
-                   "reports: BEFORE=AFTER, backends of different names to compare");
+  verb->add_option("--pair", arguments->pairs, "reports: BEFORE=AFTER, backends of different names to compare");
   verb->add_option("--factor", arguments->factor,
                    "reports: scores that moved by more are told (default 2);\n"
                    "pours: how many times the spread is still within it (default 3)")

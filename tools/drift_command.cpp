@@ -84,12 +84,9 @@ void check(DriftArguments& arguments) {
     refuse("--window", std::to_string(arguments.window), "2 to 1000 substeps");
   if (arguments.looks < 1 || arguments.looks > 100'000)
     refuse("--samples", std::to_string(arguments.looks), "1 to 100000");
-  if (!(arguments.tolerance > 0))
-    refuse("--tolerance", fmt::format("{}", arguments.tolerance), "> 0");
-  if (arguments.recommend && arguments.untimed)
-    refuse("--recommend", "given", "without --untimed: it compares times");
-  if (arguments.backend != "list")
-    refuse("--backend", arguments.backend, "list, which alone keeps lists");
+  if (!(arguments.tolerance > 0)) refuse("--tolerance", fmt::format("{}", arguments.tolerance), "> 0");
+  if (arguments.recommend && arguments.untimed) refuse("--recommend", "given", "without --untimed: it compares times");
+  if (arguments.backend != "list") refuse("--backend", arguments.backend, "list, which alone keeps lists");
   if (!arguments.series.empty() && arguments.inputs.size() != 1)
     refuse("--series", arguments.series, "one FIXTURE, whose scene it is of");
   if (!arguments.series.empty() && (arguments.recommend || arguments.whole))
@@ -107,8 +104,7 @@ std::vector<Fixture> phases_of(const Scene& scene) {
       phases.push_back(parse_phase(scene, name));
   else
     for (const int part : {1, 3, 5, 7})
-      phases.push_back(parse_phase(
-          scene, fmt::format("{}-8ths={}", part, part / 8.0 * scene.schedule.end)));
+      phases.push_back(parse_phase(scene, fmt::format("{}-8ths={}", part, part / 8.0 * scene.schedule.end)));
   std::vector<Fixture> states;
   for (const Phase& phase : phases) {
     Fixture state;
@@ -131,11 +127,12 @@ void print(const Recommendation* best, double tolerance, std::size_t windows) {
       "\nrecommended, for acceleration within {:g} (relative RMS) in each of {} windows: --backend list{}{}\n"
       "  error {:.1e} at the worst substep, {}; {:.1f} us a substep, the adaptive list {:.1f} us\n",
       tolerance, windows, adaptive ? "" : ":", best->list.options(), best->worst_error,
-      adaptive ? "by proof" : fmt::format("theory expected {:.1e}", best->expected_error),
-      best->substep_us, best->adaptive_us);
+      adaptive ? "by proof" : fmt::format("theory expected {:.1e}", best->expected_error), best->substep_us,
+      best->adaptive_us);
   if (adaptive)
-    fmt::print("  why: no fixed interval within the tolerance is faster than rebuilding when "
-               "displacements ask for it\n");
+    fmt::print(
+        "  why: no fixed interval within the tolerance is faster than rebuilding when "
+        "displacements ask for it\n");
   else
     fmt::print("  why: the fastest list that stays within it in every window{}{}\n",
                best->list.derived ? "; its skin is the one that theory asks for" : "",
@@ -160,8 +157,7 @@ void run(DriftArguments& arguments, int& exit_status) {
   };
   const BackendInfo info = make_list("")->info();
   if (arguments.inputs.empty()) arguments.inputs = default_fixtures();
-  DriftPlan plan{all_lists(arguments.intervals, arguments.skins), arguments.window,
-                 !arguments.untimed};
+  DriftPlan plan{all_lists(arguments.intervals, arguments.skins), arguments.window, !arguments.untimed};
   std::vector<Fixture> states;
   std::vector<Scene> scenes;
   for (const auto& file : arguments.inputs) {
@@ -179,9 +175,8 @@ void run(DriftArguments& arguments, int& exit_status) {
   std::vector<DriftResult> results;
   Interruptible work([&] {
     if (!arguments.quiet) fmt::print(stderr, "\n");
-    const std::string line =
-        interrupted_line(static_cast<std::int64_t>(results.size()),
-                         static_cast<std::int64_t>(states.size()), "windows measured");
+    const std::string line = interrupted_line(static_cast<std::int64_t>(results.size()),
+                                              static_cast<std::int64_t>(states.size()), "windows measured");
     fmt::print("{}{}{}\n", drift_table(results), pour_table(pours), line);
     std::fflush(stdout);
     if (!arguments.report.empty()) write_drift(arguments.report, results, pours, info, line);
@@ -195,8 +190,8 @@ void run(DriftArguments& arguments, int& exit_status) {
     pours.push_back(std::move(pour));
     for (Fixture& phase : phases) states.push_back(std::move(phase));
     if (arguments.whole)
-      whole_pours(scene, plan, disturbed_pours, make_list, [&](const auto& part) { work.part(part); },
-                  pours.back().whole);
+      whole_pours(
+          scene, plan, disturbed_pours, make_list, [&](const auto& part) { work.part(part); }, pours.back().whole);
     progress.update(1, scene.name);
   }
   if (arguments.recommend)
@@ -228,24 +223,20 @@ void run(DriftArguments& arguments, int& exit_status) {
 
 void add_drift_command(CLI::App& app, int& exit_status) {
   auto arguments = std::make_shared<DriftArguments>();
-  CLI::App& verb = *app.add_subcommand(
-      "drift", "measures what neighbor lists miss that are rebuilt every N substeps");
+  CLI::App& verb = *app.add_subcommand("drift", "measures what neighbor lists miss that are rebuilt every N substeps");
   verb.add_option("INPUT", arguments->inputs,
                   "recordings and scenes (*.json); the small recorded pours where none is named");
   verb.add_option("--intervals", arguments->intervals, "substeps between rebuilds")
       ->delimiter(',')
       ->capture_default_str();
   verb.add_option("--skins", arguments->skins, "shares of H")->delimiter(',')->capture_default_str();
-  verb.add_option("--window", arguments->window, "substeps that are run from each state")
-      ->capture_default_str();
-  verb.add_option("--backend", arguments->backend, "what is timed and followed")
-      ->capture_default_str();
+  verb.add_option("--window", arguments->window, "substeps that are run from each state")->capture_default_str();
+  verb.add_option("--backend", arguments->backend, "what is timed and followed")->capture_default_str();
   verb.add_option("--executor", arguments->executor, "cuda, host, or auto: the GPU where there is one")
       ->capture_default_str();
   verb.add_option("--report", arguments->report, "HDF5 file for rows and samples");
   verb.add_flag("--recommend", arguments->recommend, "names an interval and a skin");
-  verb.add_option("--tolerance", arguments->tolerance,
-                  "of the acceleration, relative RMS, for --recommend")
+  verb.add_option("--tolerance", arguments->tolerance, "of the acceleration, relative RMS, for --recommend")
       ->capture_default_str();
   verb.add_option("--samples", arguments->looks, "moments of a scene at which lists are compared")
       ->capture_default_str();

@@ -31,8 +31,8 @@ int export_inputs(const ExportArguments& arguments) {
   const Fixture fixture = read_fixture(recording_called(arguments.fixture));
   const auto oracle = std::make_unique<const Judgement>(prepare(fixture, {}));
   write_port_inputs(arguments.out, fixture, *oracle);
-  fmt::print("{}: {} particles, {} wall particles of {}\n", arguments.out, fixture.state.size(),
-             oracle->walls.size(), fixture.name);
+  fmt::print("{}: {} particles, {} wall particles of {}\n", arguments.out, fixture.state.size(), oracle->walls.size(),
+             fixture.name);
   return exit_pass;
 }
 

@@ -17,9 +17,8 @@ constexpr Eigen::Index largest_whole_dump = 16384;
 
 }  // namespace
 
-std::string save_failed_state(const std::filesystem::path& file, const Scene& scene,
-                              const ParticleState& good, const BackendInfo& backend,
-                              const std::string& trouble) {
+std::string save_failed_state(const std::filesystem::path& file, const Scene& scene, const ParticleState& good,
+                              const BackendInfo& backend, const std::string& trouble) {
   try {
     Fixture fixture;
     fixture.name = "failed-state";

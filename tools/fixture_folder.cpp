@@ -37,8 +37,7 @@ std::vector<fs::path> recordings(const fs::path& folder) {
 
 fs::path fixture_folder() {
   if (const char* named = std::getenv("DECANT_FIXTURES"); named && *named) {
-    if (!fs::is_directory(named))
-      throw InputError("environment", "DECANT_FIXTURES", named, "must name a folder");
+    if (!fs::is_directory(named)) throw InputError("environment", "DECANT_FIXTURES", named, "must name a folder");
     return named;
   }
   std::error_code error;
@@ -50,18 +49,15 @@ fs::path fixture_folder() {
     if (!recordings(folder / "fixtures").empty()) return folder / "fixtures";
     if (folder == folder.parent_path()) break;
   }
-  throw InputError(
-      "command line", "FIXTURE", "none",
-      "name recordings, or set DECANT_FIXTURES: no folder `fixtures` with *.h5 above " +
-          start.string());
+  throw InputError("command line", "FIXTURE", "none",
+                   "name recordings, or set DECANT_FIXTURES: no folder `fixtures` with *.h5 above " + start.string());
 }
 
 std::vector<fs::path> fixtures_in(const fs::path& folder, bool all) {
   std::vector<fs::path> files = recordings(folder);
   if (!all) std::erase_if(files, [](const fs::path& file) { return !is_small(file); });
   if (files.empty())
-    throw InputError(folder.string(), "recordings", "none",
-                     all ? "at least one *.h5" : "at least one small one");
+    throw InputError(folder.string(), "recordings", "none", all ? "at least one *.h5" : "at least one small one");
   return files;
 }
 

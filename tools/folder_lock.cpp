@@ -17,8 +17,7 @@ namespace decant {
 FolderLock::FolderLock(const char* option, const std::filesystem::path& folder)
     : descriptor_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
   if (descriptor_ < 0)
-    throw std::runtime_error(folder.string() +
-                             ": cannot be opened: " + std::generic_category().message(errno));
+    throw std::runtime_error(folder.string() + ": cannot be opened: " + std::generic_category().message(errno));
   if (::flock(descriptor_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
   ::close(descriptor_);
   throw InputError("command line", option, folder.string(),

@@ -53,23 +53,13 @@ std::vector<DatasetPlan> plan(const FrameLayout& layout) {
       {"/fluid/velocity", {t, n, 3}, f32, "m/s", "frame, particle, x y z"},
       {"/fluid/density", {t, n}, f32, "kg/m³", "frame, particle"},
       {"/fluid/pressure", {t, n}, f32, "Pa", "frame, particle"},
-      {"/fluid/place",
-       {t, n},
-       u8,
-       "",
-       "frame, particle; 0 source, 1 in flight, 2 receiver, 3 spilled, 4 lost"},
+      {"/fluid/place", {t, n}, u8, "", "frame, particle; 0 source, 1 in flight, 2 receiver, 3 spilled, 4 lost"},
   };
   for (const RenderWall& wall : layout.walls) {
     const hsize_t v = static_cast<hsize_t>(wall.surface.vertex.cols());
-    if (wall.moving)
-      plans.push_back({vertex_path(wall), {t, v, 3}, f32, "m", "frame, vertex, x y z; world"});
-    else
-      plans.push_back({vertex_path(wall), {v, 3}, f32, "m", "vertex, x y z; world"});
-    plans.push_back({triangle_path(wall),
-                     {wall.surface.triangle.size(), 3},
-                     i32,
-                     "",
-                     "triangle, its three vertices"});
+    if (wall.moving) plans.push_back({vertex_path(wall), {t, v, 3}, f32, "m", "frame, vertex, x y z; world"});
+    else plans.push_back({vertex_path(wall), {v, 3}, f32, "m", "vertex, x y z; world"});
+    plans.push_back({triangle_path(wall), {wall.surface.triangle.size(), 3}, i32, "", "triangle, its three vertices"});
   }
   return plans;
 }
@@ -92,8 +82,7 @@ Handle text_type(std::size_t size) {
 
 void put_text(hid_t object, const std::string& name, const std::string& text) {
   const Handle type = text_type(text.size() + 1), space(H5Screate(H5S_SCALAR));
-  const Handle attribute(
-      H5Acreate2(object, name.c_str(), type.get(), space.get(), H5P_DEFAULT, H5P_DEFAULT));
+  const Handle attribute(H5Acreate2(object, name.c_str(), type.get(), space.get(), H5P_DEFAULT, H5P_DEFAULT));
   if (!attribute || H5Awrite(attribute.get(), type.get(), text.c_str()) < 0)
     throw std::runtime_error("attribute " + name + ": " + hdf5_message());
 }
@@ -104,10 +93,8 @@ void put_scene(hid_t file, const Scene& scene) {
   const Handle type = text_type(text.size() + 1), space(H5Screate(H5S_SCALAR));
   const Handle creation(H5Pcreate(H5P_DATASET_CREATE));
   H5Pset_obj_track_times(creation.get(), false);
-  const Handle dataset(H5Dcreate2(file, "/scene", type.get(), space.get(), H5P_DEFAULT,
-                                  creation.get(), H5P_DEFAULT));
-  if (!dataset ||
-      H5Dwrite(dataset.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, text.c_str()) < 0)
+  const Handle dataset(H5Dcreate2(file, "/scene", type.get(), space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT));
+  if (!dataset || H5Dwrite(dataset.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, text.c_str()) < 0)
     throw std::runtime_error("dataset /scene: " + hdf5_message());
 }
 
@@ -119,10 +106,8 @@ std::uint64_t create_dataset(hid_t file, const DatasetPlan& d) {
   // Two pours of the same scene are to give the same file.
   H5Pset_obj_track_times(creation.get(), false);
   const Handle space(H5Screate_simple(static_cast<int>(d.shape.size()), d.shape.data(), nullptr));
-  if (!make_group(file, parent_path(d.path)))
-    throw std::runtime_error("dataset " + d.path + ": " + hdf5_message());
-  const Handle dataset(H5Dcreate2(file, d.path.c_str(), d.type, space.get(), H5P_DEFAULT,
-                                  creation.get(), H5P_DEFAULT));
+  if (!make_group(file, parent_path(d.path))) throw std::runtime_error("dataset " + d.path + ": " + hdf5_message());
+  const Handle dataset(H5Dcreate2(file, d.path.c_str(), d.type, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT));
   if (!dataset) throw std::runtime_error("dataset " + d.path + ": " + hdf5_message());
   if (!d.unit.empty()) put_text(dataset.get(), "unit", d.unit);
   put_text(dataset.get(), "description", d.description);
@@ -138,16 +123,14 @@ std::uint64_t create_dataset(hid_t file, const DatasetPlan& d) {
 int open_exclusively(const std::filesystem::path& file) {
   const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (descriptor < 0) fail_errno(file, "cannot be opened");
-  struct flock lock {};
+  struct flock lock{};
   lock.l_type = F_WRLCK;
   lock.l_whence = SEEK_SET;
-  struct stat own {
-  }, named{};
-  const bool taken =
-      ::fcntl(descriptor, F_OFD_SETLK, &lock) != 0 && (errno == EAGAIN || errno == EACCES);
+  struct stat own{}, named{};
+  const bool taken = ::fcntl(descriptor, F_OFD_SETLK, &lock) != 0 && (errno == EAGAIN || errno == EACCES);
   // Whoever had it before may have given the file its final name meanwhile.
-  const bool gone = ::fstat(descriptor, &own) != 0 || ::stat(file.c_str(), &named) != 0 ||
-                    own.st_ino != named.st_ino || own.st_dev != named.st_dev;
+  const bool gone = ::fstat(descriptor, &own) != 0 || ::stat(file.c_str(), &named) != 0 || own.st_ino != named.st_ino ||
+                    own.st_dev != named.st_dev;
   if (!taken && !gone) return descriptor;
   ::close(descriptor);
   throw InputError(file.string(), "frames", "in use", "another pour is writing this file");
@@ -155,8 +138,7 @@ int open_exclusively(const std::filesystem::path& file) {
 
 std::uint64_t find_dataset(hid_t file, const std::filesystem::path& name, const DatasetPlan& d) {
   const Handle dataset(H5Dopen2(file, d.path.c_str(), H5P_DEFAULT));
-  if (!dataset)
-    throw InputError(name.string(), d.path, "missing", "a frame file of the same scene is needed");
+  if (!dataset) throw InputError(name.string(), d.path, "missing", "a frame file of the same scene is needed");
   const Handle space(H5Dget_space(dataset.get())), type(H5Dget_type(dataset.get()));
   std::vector<hsize_t> shape(static_cast<std::size_t>(H5Sget_simple_extent_ndims(space.get())));
   H5Sget_simple_extent_dims(space.get(), shape.data(), nullptr);
@@ -186,13 +168,11 @@ FrameLayout frame_layout(const Scene& scene, std::int64_t particles) {
   layout.particles = particles;
   layout.frames = scene.schedule.frames + 1;
   for (const Container& container : scene.containers)
-    layout.walls.push_back(
-        {container.name, moves(container), render_surface(container, scene.particle_spacing)});
+    layout.walls.push_back({container.name, moves(container), render_surface(container, scene.particle_spacing)});
   return layout;
 }
 
-std::vector<float> posed_vertices(const Container& container, const RenderSurface& surface,
-                                  double time) {
+std::vector<float> posed_vertices(const Container& container, const RenderSurface& surface, double time) {
   const Pose pose = pose_at(container, time);
   std::vector<float> world(3 * static_cast<std::size_t>(surface.vertex.cols()));
   Eigen::Map<Eigen::Matrix3Xf> out(world.data(), 3, surface.vertex.cols());
@@ -224,8 +204,7 @@ FrameFile::~FrameFile() {
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
-FrameFile FrameFile::create(const std::filesystem::path& file, const Scene& scene,
-                            const FrameLayout& layout,
+FrameFile FrameFile::create(const std::filesystem::path& file, const Scene& scene, const FrameLayout& layout,
                             const std::map<std::string, std::string>& texts) {
   FrameFile out(file, layout);
   // Before HDF5 empties it.
@@ -266,16 +245,14 @@ FrameFile FrameFile::reopen(const std::filesystem::path& file, const FrameLayout
   {
     const Handle access = without_locks();
     const Handle id(H5Fopen(file.c_str(), H5F_ACC_RDONLY, access.get()));
-    if (!id)
-      throw InputError(file.string(), "frames", hdf5_message(), "a checkpoint continues this file");
+    if (!id) throw InputError(file.string(), "frames", hdf5_message(), "a checkpoint continues this file");
     for (const DatasetPlan& d : plan(layout)) out.offset_[d.path] = find_dataset(id.get(), file, d);
   }
   out.descriptor_ = open_exclusively(file);
   return out;
 }
 
-void FrameFile::put(std::uint64_t dataset_offset, const void* data, std::size_t bytes,
-                    std::int64_t row) {
+void FrameFile::put(std::uint64_t dataset_offset, const void* data, std::size_t bytes, std::int64_t row) {
   auto* from = static_cast<const char*>(data);
   auto at = static_cast<off_t>(dataset_offset + static_cast<std::uint64_t>(row) * bytes);
   while (bytes > 0) {
@@ -291,9 +268,8 @@ void FrameFile::put(std::uint64_t dataset_offset, const void* data, std::size_t 
 void FrameFile::write(const Frame& frame) {
   const auto n = static_cast<std::size_t>(particles_);
   const bool fits = frame.index >= 0 && frame.index < frames_ && frame.position.size() == 3 * n &&
-                    frame.velocity.size() == 3 * n && frame.density.size() == n &&
-                    frame.pressure.size() == n && frame.place.size() == n &&
-                    frame.wall.size() == moving_.size();
+                    frame.velocity.size() == 3 * n && frame.density.size() == n && frame.pressure.size() == n &&
+                    frame.place.size() == n && frame.wall.size() == moving_.size();
   if (!fits) fail(file_, fmt::format("frame {} does not fit its layout", frame.index));
   const auto column = [&](const std::string& path, const auto& values) {
     put(offset_.at(path), values.data(), byte_count(values), frame.index);

@@ -44,8 +44,7 @@ struct Frame {
 };
 
 /// World coordinates of a surface's vertices, x y z by vertex. \param time  s
-std::vector<float> posed_vertices(const Container& container, const RenderSurface& surface,
-                                  double time);
+std::vector<float> posed_vertices(const Container& container, const RenderSurface& surface, double time);
 
 /// Bytes that the frame file of a layout takes, the datasets alone.
 std::int64_t frame_file_bytes(const FrameLayout& layout);
@@ -56,8 +55,7 @@ class FrameFile {
   /// Creates the file with all datasets, reserves its room on the disk, marks all frames unwritten
   /// (time NaN) and writes the walls that stand still. `texts` become attributes of the root.
   /// Throws std::runtime_error naming the file.
-  static FrameFile create(const std::filesystem::path& file, const Scene& scene,
-                          const FrameLayout& layout,
+  static FrameFile create(const std::filesystem::path& file, const Scene& scene, const FrameLayout& layout,
                           const std::map<std::string, std::string>& texts);
   /// Opens a file left unfinished. Throws InputError where its datasets do not fit the layout.
   static FrameFile reopen(const std::filesystem::path& file, const FrameLayout& layout);

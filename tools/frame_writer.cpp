@@ -6,8 +6,8 @@
 
 namespace decant {
 
-Frame make_frame(const Scene& scene, const FrameLayout& layout, std::int64_t index,
-                 const ParticleState& state, const Fields& fields, const AuditResult& audit) {
+Frame make_frame(const Scene& scene, const FrameLayout& layout, std::int64_t index, const ParticleState& state,
+                 const Fields& fields, const AuditResult& audit) {
   const auto n = static_cast<std::size_t>(state.size());
   Frame frame;
   frame.index = index;
@@ -16,17 +16,14 @@ Frame make_frame(const Scene& scene, const FrameLayout& layout, std::int64_t ind
   frame.velocity.resize(3 * n);
   frame.density.resize(n);
   frame.pressure.resize(n);
-  Eigen::Map<Eigen::Matrix3Xf>(frame.position.data(), 3, state.size()) =
-      state.position.cast<float>();
-  Eigen::Map<Eigen::Matrix3Xf>(frame.velocity.data(), 3, state.size()) =
-      state.velocity.cast<float>();
+  Eigen::Map<Eigen::Matrix3Xf>(frame.position.data(), 3, state.size()) = state.position.cast<float>();
+  Eigen::Map<Eigen::Matrix3Xf>(frame.velocity.data(), 3, state.size()) = state.velocity.cast<float>();
   Eigen::Map<Eigen::VectorXf>(frame.density.data(), state.size()) = fields.density.cast<float>();
   Eigen::Map<Eigen::VectorXf>(frame.pressure.data(), state.size()) = fields.pressure.cast<float>();
   frame.place = audit.place;
   for (std::size_t c = 0; c < layout.walls.size(); ++c)
     if (layout.walls[c].moving)
-      frame.wall.push_back(
-          posed_vertices(scene.containers.at(c), layout.walls[c].surface, frame.time));
+      frame.wall.push_back(posed_vertices(scene.containers.at(c), layout.walls[c].surface, frame.time));
   return frame;
 }
 

@@ -19,8 +19,8 @@ namespace decant {
 
 /// A frame of one state: rounded to fp32, moving walls posed at its time. `fields` gives density
 /// and pressure, `audit` the places.
-Frame make_frame(const Scene& scene, const FrameLayout& layout, std::int64_t index,
-                 const ParticleState& state, const Fields& fields, const AuditResult& audit);
+Frame make_frame(const Scene& scene, const FrameLayout& layout, std::int64_t index, const ParticleState& state,
+                 const Fields& fields, const AuditResult& audit);
 
 /// Queue with a bounded number of frames and the thread that empties it.
 class FrameWriter {

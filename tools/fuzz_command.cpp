@@ -36,8 +36,7 @@ std::string footer() {
       "its scene beside it. Ctrl-C ends a campaign and keeps what it found: exit status 130.\n"
       "\n"
       "Properties; where none is named, the expensive ones are asked of every 2nd, 4th or 8th problem:\n";
-  for (const fuzz::Property& p : fuzz::properties())
-    text += fmt::format("  {:<13} {}\n", p.name, p.sentence);
+  for (const fuzz::Property& p : fuzz::properties()) text += fmt::format("  {:<13} {}\n", p.name, p.sentence);
   return text +
          "Exit status: 0 all hold, 1 a property does not hold, 2 bad input, 77 the device of\n"
          "--executor is absent.\n"
@@ -65,18 +64,14 @@ std::set<std::string> chosen(const std::vector<std::string>& given) {
 void run(FuzzArguments& arguments, int& exit_status) {
   if (arguments.write) {
     const std::string seed = fmt::format("{}", arguments.seed);
-    fmt::print("decant conform {}\n",
-               fuzz::write_problem(arguments.failures, fuzz::random_genome(arguments.seed),
-                                   "fuzz-" + seed, {{"fuzz_seed", seed}}));
+    fmt::print("decant conform {}\n", fuzz::write_problem(arguments.failures, fuzz::random_genome(arguments.seed),
+                                                          "fuzz-" + seed, {{"fuzz_seed", seed}}));
     return;
   }
   if (arguments.cases < 0 && arguments.seconds <= 0) arguments.cases = 1000;
-  if (arguments.seconds < 0)
-    throw InputError("command line", "--seconds", fmt::format("{}", arguments.seconds), "> 0");
+  if (arguments.seconds < 0) throw InputError("command line", "--seconds", fmt::format("{}", arguments.seconds), "> 0");
   check_output_place("--report", arguments.report);
-  const auto make = [&](const std::string& choice) {
-    return choose_backend(choice, arguments.executor);
-  };
+  const auto make = [&](const std::string& choice) { return choose_backend(choice, arguments.executor); };
   BackendInfo info;
   for (const auto& name : arguments.backends) info = make(name)->info();
 
@@ -87,9 +82,8 @@ void run(FuzzArguments& arguments, int& exit_status) {
   settings.first_seed = arguments.seed;
   settings.cases = arguments.cases;
   settings.seconds = arguments.seconds;
-  settings.threads = arguments.threads > 0
-                         ? arguments.threads
-                         : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  settings.threads =
+      arguments.threads > 0 ? arguments.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   settings.most_findings = arguments.most_findings;
   settings.shrink_tries = arguments.no_shrink ? 0 : 2000;
   settings.failures = arguments.failures;
@@ -97,8 +91,7 @@ void run(FuzzArguments& arguments, int& exit_status) {
   settings.stop = [] { return StopSignal::caught() != 0; };
   fuzz::Campaign result;
   {
-    Progress progress("problem", std::max<std::int64_t>(arguments.cases, 1), 0,
-                      arguments.quiet || arguments.cases < 0);
+    Progress progress("problem", std::max<std::int64_t>(arguments.cases, 1), 0, arguments.quiet || arguments.cases < 0);
     settings.progress = [&](const fuzz::Campaign& now) {
       double worst = 0;
       std::int64_t failed = 0;
@@ -106,21 +99,18 @@ void run(FuzzArguments& arguments, int& exit_status) {
         worst = std::max(worst, tally.worst);
         failed += tally.failed;
       }
-      const std::string note =
-          fmt::format("{:.0f} a second, worst score {:.3f}, {} failures",
-                      static_cast<double>(now.cases) / now.seconds, worst, failed);
-      if (arguments.cases >= 0)
-        progress.update(now.cases, note);
-      else if (!arguments.quiet)
-        fmt::print(stderr, "\r{:.0f} s, {} problems, {}  ", now.seconds, now.cases, note);
+      const std::string note = fmt::format("{:.0f} a second, worst score {:.3f}, {} failures",
+                                           static_cast<double>(now.cases) / now.seconds, worst, failed);
+      if (arguments.cases >= 0) progress.update(now.cases, note);
+      else if (!arguments.quiet) fmt::print(stderr, "\r{:.0f} s, {} problems, {}  ", now.seconds, now.cases, note);
     };
     result = fuzz::run_campaign(settings, make);
     if (arguments.cases < 0 && !arguments.quiet) fmt::print(stderr, "\n");
   }
   fmt::print("{}", fuzz::campaign_table(result));
   if (!arguments.report.empty()) fuzz::write_campaign(arguments.report, result, info);
-  const bool holds = std::all_of(result.tallies.begin(), result.tallies.end(),
-                                 [](const fuzz::Tally& t) { return t.failed == 0; });
+  const bool holds =
+      std::all_of(result.tallies.begin(), result.tallies.end(), [](const fuzz::Tally& t) { return t.failed == 0; });
   exit_status = holds ? exit_pass : exit_does_not_conform;
   if (StopSignal::caught() == 0) return;
   fmt::print("interrupted: {} problems asked\n", result.cases);

@@ -14,10 +14,8 @@ constexpr std::size_t left_column = 24;
 std::string two_columns(const std::string& left, const std::string& right) {
   std::string out = "  " + left;
   if (right.empty()) return out + "\n";
-  if (out.size() + 2 > left_column)
-    out += "\n" + std::string(left_column, ' ');
-  else
-    out.resize(left_column, ' ');
+  if (out.size() + 2 > left_column) out += "\n" + std::string(left_column, ' ');
+  else out.resize(left_column, ' ');
   for (const char c : reflowed(right, help_width - left_column)) {
     out += c;
     if (c == '\n') out.append(left_column, ' ');
@@ -28,10 +26,8 @@ std::string two_columns(const std::string& left, const std::string& right) {
 std::vector<std::string> lines_of(const std::string& text) {
   std::vector<std::string> lines(1);
   for (const char c : text)
-    if (c == '\n')
-      lines.emplace_back();
-    else
-      lines.back() += c;
+    if (c == '\n') lines.emplace_back();
+    else lines.back() += c;
   return lines;
 }
 
@@ -145,8 +141,7 @@ std::string explained(const CLI::App& app, const CLI::ParseError& error, const s
   };
   const auto verbs = app.get_subcommands();
   if (verbs.empty()) {
-    if (arguments.empty() || arguments.front().starts_with("-"))
-      return fmt::format("{} (decant --help)", error.what());
+    if (arguments.empty() || arguments.front().starts_with("-")) return fmt::format("{} (decant --help)", error.what());
     std::vector<std::string> names;
     for (const CLI::App* verb : app.get_subcommands([](const CLI::App*) { return true; }))
       names.push_back(verb->get_name());

@@ -13,8 +13,7 @@
 namespace decant {
 
 Interruptible::Interruptible(std::function<void()> conclude)
-    : conclude_(std::move(conclude)),
-      watcher_([] { return StopSignal::caught() != 0; }, [this] { leave(); }) {}
+    : conclude_(std::move(conclude)), watcher_([] { return StopSignal::caught() != 0; }, [this] { leave(); }) {}
 
 void Interruptible::leave() {
   int status = exit_status();

@@ -19,8 +19,7 @@ struct Case {
   std::vector<const CheckRow*> rows;
 
   bool has(Verdict verdict) const {
-    return std::any_of(rows.begin(), rows.end(),
-                       [&](const CheckRow* row) { return judged_verdict(*row) == verdict; });
+    return std::any_of(rows.begin(), rows.end(), [&](const CheckRow* row) { return judged_verdict(*row) == verdict; });
   }
   bool fails() const { return has(Verdict::fail); }
   bool skipped() const { return !fails() && has(Verdict::not_run); }
@@ -35,13 +34,11 @@ std::vector<Suite> suites_of(const Report& report) {
   std::vector<Suite> suites;
   for (const CheckRow& row : report.rows) {
     const std::string name = backend_label(row);
-    auto suite =
-        std::find_if(suites.begin(), suites.end(), [&](const Suite& s) { return s.name == name; });
+    auto suite = std::find_if(suites.begin(), suites.end(), [&](const Suite& s) { return s.name == name; });
     if (suite == suites.end()) suite = suites.insert(suites.end(), {name, {}});
     auto& cases = suite->cases;
-    auto found = std::find_if(cases.begin(), cases.end(), [&](const Case& c) {
-      return c.fixture == row.fixture && c.check == row.check;
-    });
+    auto found = std::find_if(cases.begin(), cases.end(),
+                              [&](const Case& c) { return c.fixture == row.fixture && c.check == row.check; });
     if (found == cases.end()) found = cases.insert(cases.end(), {row.fixture, row.check, {}});
     found->rows.push_back(&row);
   }
@@ -59,8 +56,7 @@ struct Counts {
     }
   }
   std::string attributes() const {
-    return fmt::format(R"(tests="{}" failures="{}" errors="0" skipped="{}")", tests, failures,
-                       skipped);
+    return fmt::format(R"(tests="{}" failures="{}" errors="0" skipped="{}")", tests, failures, skipped);
   }
 };
 
@@ -78,14 +74,13 @@ std::string message_of(const CheckRow& row) {
   if (row.n == 0) return check_label(row) + ": " + judged_reason(row);
   const auto unit = row.unit.empty() || row.unit == "1" ? "" : " " + row.unit;
   const auto where = row.worst_id >= 0 ? fmt::format(", particle {}", row.worst_id) : "";
-  return fmt::format("{}{}: value {:.6g}{}, tolerance {:.6g}{}, score {:.4g}", check_label(row),
-                     where, row.value, unit, row.tolerance, unit, row.score);
+  return fmt::format("{}{}: value {:.6g}{}, tolerance {:.6g}{}, score {:.4g}", check_label(row), where, row.value, unit,
+                     row.tolerance, unit, row.score);
 }
 
 std::string case_xml(const Suite& suite, const Case& c) {
-  std::string xml =
-      fmt::format(R"(    <testcase classname="{}.{}" name="{}")", xml_escaped(suite.name),
-                  xml_escaped(c.fixture), xml_escaped(c.check));
+  std::string xml = fmt::format(R"(    <testcase classname="{}.{}" name="{}")", xml_escaped(suite.name),
+                                xml_escaped(c.fixture), xml_escaped(c.check));
   if (c.fails()) {
     std::string text;
     for (const CheckRow* row : c.rows)
@@ -93,8 +88,7 @@ std::string case_xml(const Suite& suite, const Case& c) {
     return xml + fmt::format(
                      ">\n      <failure type=\"{}\" message=\"{}\">{}</failure>\n"
                      "    </testcase>\n",
-                     xml_escaped(c.check), xml_escaped(message_of(worst_of(c, Verdict::fail))),
-                     xml_escaped(text));
+                     xml_escaped(c.check), xml_escaped(message_of(worst_of(c, Verdict::fail))), xml_escaped(text));
   }
   if (c.skipped())
     return xml + fmt::format(">\n      <skipped message=\"{}\"/>\n    </testcase>\n",
@@ -105,8 +99,7 @@ std::string case_xml(const Suite& suite, const Case& c) {
 std::string properties_xml(const std::map<std::string, std::string>& provenance) {
   std::string xml = "    <properties>\n";
   for (const auto& [name, value] : provenance)
-    xml += fmt::format("      <property name=\"{}\" value=\"{}\"/>\n", xml_escaped(name),
-                       xml_escaped(value));
+    xml += fmt::format("      <property name=\"{}\" value=\"{}\"/>\n", xml_escaped(name), xml_escaped(value));
   return xml + "    </properties>\n";
 }
 
@@ -122,8 +115,7 @@ std::size_t character_length(std::string_view text) {
     code = code << 6 | (byte(k) & 0x3Fu);
   }
   const bool overlong = (length == 3 && code < 0x800) || (length == 4 && code < 0x10000);
-  const bool no_character =
-      (code >= 0xD800 && code < 0xE000) || code == 0xFFFE || code == 0xFFFF || code > 0x10FFFF;
+  const bool no_character = (code >= 0xD800 && code < 0xE000) || code == 0xFFFE || code == 0xFFFF || code > 0x10FFFF;
   return overlong || no_character ? 0 : length;
 }
 
@@ -175,8 +167,7 @@ std::string junit_xml(const Report& report) {
   for (const Suite& suite : suites) {
     Counts counts;
     counts.add(suite);
-    xml +=
-        fmt::format("  <testsuite name=\"{}\" {}>\n", xml_escaped(suite.name), counts.attributes());
+    xml += fmt::format("  <testsuite name=\"{}\" {}>\n", xml_escaped(suite.name), counts.attributes());
     xml += properties_xml(report.provenance);
     for (const Case& c : suite.cases) xml += case_xml(suite, c);
     xml += "  </testsuite>\n";

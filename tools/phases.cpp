@@ -16,11 +16,8 @@
 namespace decant {
 namespace {
 
-constexpr std::array<std::pair<const char*, double>, 5> fraction_of_tilt = {{{"settled", 0.0},
-                                                                             {"tilt-onset", 0.25},
-                                                                             {"stream", 0.57},
-                                                                             {"splash", 0.65},
-                                                                             {"filling", 0.85}}};
+constexpr std::array<std::pair<const char*, double>, 5> fraction_of_tilt = {
+    {{"settled", 0.0}, {"tilt-onset", 0.25}, {"stream", 0.57}, {"splash", 0.65}, {"filling", 0.85}}};
 
 [[noreturn]] void refuse(const std::string& value, const std::string& bound) {
   throw InputError("command line", "--phase", value, bound);
@@ -64,8 +61,7 @@ Phase parse_phase(const Scene& scene, const std::string& text) {
   const bool fits_a_file_name =
       !phase.name.empty() && phase.name.find('/') == std::string::npos && phase.name[0] != '.';
   if (!fits_a_file_name) refuse(text, "a name that can be part of a file's name");
-  if (!(time >= 0 && time <= scene.schedule.end))
-    refuse(text, fmt::format("a time in 0 … {} s", scene.schedule.end));
+  if (!(time >= 0 && time <= scene.schedule.end)) refuse(text, fmt::format("a time in 0 … {} s", scene.schedule.end));
   phase.substep = std::llround(time / scene.time_step());
   return phase;
 }

@@ -38,9 +38,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 /// What a look at walls found, joined to what another one found.
 void keep_worst(AuditResult& all, const AuditResult& one) {
@@ -60,9 +58,7 @@ std::int64_t fastest_in(const ParticleState& state) {
   return fastest;
 }
 
-bool finite(const ParticleState& state) {
-  return state.position.allFinite() && state.velocity.allFinite();
-}
+bool finite(const ParticleState& state) { return state.position.allFinite() && state.velocity.allFinite(); }
 
 class Pour {
  public:
@@ -119,8 +115,8 @@ class Pour {
   StageTimes stages_before_;  // of the sessions before this one
   double wall_before_ = 0;    // s
   Clock::time_point started_ = Clock::now(), saved_ = started_;
-  double checkpoint_cost_ = 0;  // s, of the last one
-  bool begun_ = false;          // a checkpoint of this state can be written
+  double checkpoint_cost_ = 0;     // s, of the last one
+  bool begun_ = false;             // a checkpoint of this state can be written
   std::vector<std::string> told_;  // limits that were passed
   std::optional<Progress> progress_;
   std::optional<FrameFile> file_;
@@ -133,31 +129,26 @@ PourResult Pour::run() {
   if (fs::is_directory(options_.out)) lock_folder();
   check_pour_folder(options_, files_);
   walls_ = call([&] { return sample_walls(scene_); });
-  if (options_.resume)
-    resume();
-  else
-    start();
+  if (options_.resume) resume();
+  else start();
   progress_.emplace("frame", scene_.schedule.frames, frame_, options_.quiet);
   progress_->update(frame_);
   tell_limits();
   while (frame_ < scene_.schedule.frames && !(options_.stop && options_.stop())) {
     if (next_stretch()) {
       const TimelineRow& row = timeline_.rows.back();
-      progress_->update(frame_, fmt::format("t = {:.3f} s, v <= {:.2f} m/s{}", row.time,
-                                            row.max_speed, told_.empty() ? "" : ", BEYOND LIMITS"));
+      progress_->update(frame_, fmt::format("t = {:.3f} s, v <= {:.2f} m/s{}", row.time, row.max_speed,
+                                            told_.empty() ? "" : ", BEYOND LIMITS"));
       tell_limits();
     }
     // Checkpoints take at most a twentieth of the time.
-    const double interval = options_.checkpoint_seconds > 0
-                                ? std::max(options_.checkpoint_seconds, 20 * checkpoint_cost_)
-                                : 0.0;
+    const double interval =
+        options_.checkpoint_seconds > 0 ? std::max(options_.checkpoint_seconds, 20 * checkpoint_cost_) : 0.0;
     if (seconds_since(saved_) >= interval) checkpoint();
   }
   progress_->pause();
-  if (frame_ == scene_.schedule.frames)
-    finish();
-  else
-    checkpoint();
+  if (frame_ == scene_.schedule.frames) finish();
+  else checkpoint();
   return result();
 }
 
@@ -214,13 +205,11 @@ void Pour::start() {
 
 void Pour::resume() {
   Checkpoint from = read_checkpoint(files_.checkpoint);
-  check_same_pour(files_.checkpoint, from, scene_, backend_.info(),
-                  {options_.csv, options_.perturbation});
+  check_same_pour(files_.checkpoint, from, scene_, backend_.info(), {options_.csv, options_.perturbation});
   state_ = std::move(from.state);
   frame_ = from.frame;
   if (const std::int64_t done = done_in_frame();
-      done < 0 || (done > 0) != from.part.has_value() || done >= stretches_.substeps() ||
-      !stretches_.meet_at(done))
+      done < 0 || (done > 0) != from.part.has_value() || done >= stretches_.substeps() || !stretches_.meet_at(done))
     throw InputError(files_.checkpoint.string(), "substep", std::to_string(state_.substep),
                      fmt::format("where a stretch of frame {} ends", frame_ + 1));
   timeline_ = std::move(from.timeline);
@@ -228,8 +217,7 @@ void Pour::resume() {
   wall_before_ = from.wall_seconds;
   layout_ = frame_layout(scene_, state_.size());
   // A pour killed among its last steps has its frames under their final name already.
-  if (!fs::exists(files_.partial) && fs::exists(files_.frames))
-    fs::rename(files_.frames, files_.partial);
+  if (!fs::exists(files_.partial) && fs::exists(files_.frames)) fs::rename(files_.frames, files_.partial);
   check_room(options_, files_, layout_, frame_ + 1);
   call([&] { backend_.load(scene_, walls_, state_); });
   // Paths to the next look start at the last one.
@@ -246,8 +234,8 @@ void Pour::resume() {
     fmt::print(stderr, "resumes after frame {}{}\n", frame_,
                from.part ? fmt::format(", at substep {}", state_.substep) : "");
   if (!options_.quiet && from.backend.device != backend_.info().device)
-    fmt::print(stderr, "started on {}, resumes on {}: the last bits may differ\n",
-               from.backend.device, backend_.info().device);
+    fmt::print(stderr, "started on {}, resumes on {}: the last bits may differ\n", from.backend.device,
+               backend_.info().device);
 }
 
 void Pour::open_frames(bool anew) {
@@ -292,8 +280,7 @@ void Pour::look(const Fields& fields) {
 
 /// Whether it ended a frame.
 bool Pour::next_stretch() {
-  const std::int64_t done = done_in_frame(), end = stretches_.end_of(done),
-                     expected = state_.substep + end - done;
+  const std::int64_t done = done_in_frame(), end = stretches_.end_of(done), expected = state_.substep + end - done;
   if (done == 0) {
     part_.looked_at = state_.position;
     part_.looked_at_substep = state_.substep;
@@ -315,9 +302,8 @@ bool Pour::next_stretch() {
   });
   check(advanced, state_);
   if (next.substep != expected || next.size() != state_.size())
-    throw BackendError(fmt::format("{}: {} particles at substep {} instead of {} at {}",
-                                   backend_.info().name, next.size(), next.substep, state_.size(),
-                                   expected));
+    throw BackendError(fmt::format("{}: {} particles at substep {} instead of {} at {}", backend_.info().name,
+                                   next.size(), next.substep, state_.size(), expected));
   if (!finite(next)) check({Status::non_finite, -1, next.substep}, state_);
   state_ = std::move(next);
   part_.solver_seconds += seconds;
@@ -353,8 +339,14 @@ void Pour::checkpoint() {
   const auto before = Clock::now();
   writer_->drain();
   file_->sync();
-  Checkpoint now{frame_,       state_, timeline_, {}, {options_.csv, options_.perturbation},
-                 wall_seconds(), scene_to_json(scene_), backend_.info()};
+  Checkpoint now{frame_,
+                 state_,
+                 timeline_,
+                 {},
+                 {options_.csv, options_.perturbation},
+                 wall_seconds(),
+                 scene_to_json(scene_),
+                 backend_.info()};
   if (done_in_frame() > 0) now.part = part_;
   write_checkpoint(files_.checkpoint, now);
   saved_ = Clock::now();
@@ -386,9 +378,8 @@ void Pour::check(const Status& status, const ParticleState& good) {
 }
 
 void Pour::dump(const std::string& trouble, const ParticleState& good) {
-  throw BackendError(fmt::format(
-      "{} on {}: {}{}", backend_.info().name, backend_.info().executor, trouble,
-      save_failed_state(files_.failed, scene_, good, backend_.info(), trouble)));
+  throw BackendError(fmt::format("{} on {}: {}{}", backend_.info().name, backend_.info().executor, trouble,
+                                 save_failed_state(files_.failed, scene_, good, backend_.info(), trouble)));
 }
 
 }  // namespace

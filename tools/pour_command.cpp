@@ -43,12 +43,10 @@ constexpr const char* footer =
 Scene scene_of(const PourArguments& arguments) {
   const auto at_least_one = [](const char* option, std::int64_t value, std::int64_t most) {
     if (value < 1 || value > most)
-      throw InputError("command line", option, std::to_string(value),
-                       fmt::format("must be 1 … {}", most));
+      throw InputError("command line", option, std::to_string(value), fmt::format("must be 1 … {}", most));
   };
   Scene scene = load_scene(arguments.scene);
-  if (arguments.particles)
-    scene = with_asked_particles(scene, *arguments.particles, arguments.scene);
+  if (arguments.particles) scene = with_asked_particles(scene, *arguments.particles, arguments.scene);
   if (arguments.frames) {
     at_least_one("--frames", *arguments.frames, 1'000'000);
     scene = with_frames(scene, static_cast<int>(*arguments.frames));
@@ -61,20 +59,16 @@ Scene scene_of(const PourArguments& arguments) {
 
 int run(PourArguments& arguments) {
   const Scene scene = scene_of(arguments);
-  const auto backend =
-      choose_backend(arguments.flags.applied_to(arguments.backend), arguments.executor);
+  const auto backend = choose_backend(arguments.flags.applied_to(arguments.backend), arguments.executor);
   arguments.flags.require_used();
   const StopSignal signal;
   const BackendInfo info = backend->info();
   const auto tell_stopped = [&](const PourResult& result) {
-    if (arguments.json && result.frame >= 0)
-      fmt::print("{}\n", pour_json(result, info, arguments.out));
+    if (arguments.json && result.frame >= 0) fmt::print("{}\n", pour_json(result, info, arguments.out));
     std::fflush(stdout);
-    if (!arguments.quiet && result.frame < 0)
-      fmt::print(stderr, "stopped before the first frame; nothing is kept\n");
+    if (!arguments.quiet && result.frame < 0) fmt::print(stderr, "stopped before the first frame; nothing is kept\n");
     else if (!arguments.quiet)
-      fmt::print(stderr,
-                 "stopped after frame {} of {}, at substep {}; the same command with --resume goes on\n",
+      fmt::print(stderr, "stopped after frame {} of {}, at substep {}; the same command with --resume goes on\n",
                  result.frame, scene.schedule.frames, result.substep);
     return 128 + StopSignal::caught();
   };
@@ -89,10 +83,8 @@ int run(PourArguments& arguments) {
   const PourResult result = pour(scene, *backend, options);
 
   if (!result.finished) return tell_stopped(result);
-  if (arguments.json)
-    fmt::print("{}\n", pour_json(result, info, arguments.out));
-  else if (!arguments.quiet)
-    print_pour(result, info, scene);
+  if (arguments.json) fmt::print("{}\n", pour_json(result, info, arguments.out));
+  else if (!arguments.quiet) print_pour(result, info, scene);
   const bool conforms = result.summary.balanced() && !result.summary.penetrated();
   return conforms ? exit_pass : exit_does_not_conform;
 }
@@ -103,16 +95,12 @@ void add_pour_command(CLI::App& app, int& exit_status) {
   auto* command = app.add_subcommand("pour", "run a scene; write frames, timeline, mass by place");
   auto a = std::make_shared<PourArguments>();
   command->add_option("SCENE", a->scene, "Scene file (JSON)")->required();
-  command->add_option("--out", a->out, "Folder for frames.h5, *.xdmf, timeline.h5, csv/")
-      ->required();
-  command->add_option("--backend", a->backend, "reference, brute, …")
-      ->capture_default_str();
+  command->add_option("--out", a->out, "Folder for frames.h5, *.xdmf, timeline.h5, csv/")->required();
+  command->add_option("--backend", a->backend, "reference, brute, …")->capture_default_str();
   command->add_option("--executor", a->executor, "auto, cuda or host")->capture_default_str();
   a->flags.add_to(*command);
-  command->add_option("--particles", a->particles,
-                      "About this many; spacing and all that follows are derived anew");
-  command->add_option("--frames", a->frames,
-                      "Frames over the same time; the substep stays within its limits");
+  command->add_option("--particles", a->particles, "About this many; spacing and all that follows are derived anew");
+  command->add_option("--frames", a->frames, "Frames over the same time; the substep stays within its limits");
   command->add_option("--perturb", a->perturbation,
                       "Seed of a random change of the start in its last bits, for ensembles");
   command->add_flag("--csv", a->csv, "Also write csv/fluid_000123.csv and boundaries");

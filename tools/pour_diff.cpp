@@ -44,16 +44,13 @@ class Frames {
   const std::string& scene() const { return scene_; }
   double time(std::int64_t frame) const { return time_[frame]; }
   /// NaN stands where a frame has not been written yet.
-  bool written(std::int64_t frame) const {
-    return frame < time_.size() && std::isfinite(time_[frame]);
-  }
+  bool written(std::int64_t frame) const { return frame < time_.size() && std::isfinite(time_[frame]); }
   FrameValues at(std::int64_t frame) const {
     return {in_.matrix3_at("/fluid/position", frame), in_.matrix3_at("/fluid/velocity", frame),
             in_.vector_at("/fluid/density", frame), in_.vector_at("/fluid/pressure", frame),
             in_.integers_at("/fluid/place", frame).cast<double>()};
   }
-  [[noreturn]] void refuse(const std::string& key, const std::string& value,
-                           const std::string& bound) const {
+  [[noreturn]] void refuse(const std::string& key, const std::string& value, const std::string& bound) const {
     in_.fail(key, value, bound);
   }
 
@@ -105,8 +102,7 @@ FieldDistances distances(const Scene& scene, const FrameValues& a, const FrameVa
   const auto n = a.position.cols();
   double squares = 0;
   for (Eigen::Index i = 0; i < n; ++i) {
-    const double d =
-        separation(Vec3(a.position.col(i)), Vec3(b.position.col(i))).norm() / scene.particle_spacing;
+    const double d = separation(Vec3(a.position.col(i)), Vec3(b.position.col(i))).norm() / scene.particle_spacing;
     squares += d * d;
     if (out && !(d <= out->farthest)) {
       out->farthest = d;
@@ -129,8 +125,7 @@ std::set<std::size_t> shown_frames(const PourDiff& diff) {
   std::set<std::size_t> shown;
   const std::int64_t marks[] = {diff.first_difference(), diff.beyond().frame};
   for (std::size_t k = 0; k < diff.frames.size(); ++k) {
-    const bool marked = std::find(std::begin(marks), std::end(marks), diff.frames[k].frame) !=
-                        std::end(marks);
+    const bool marked = std::find(std::begin(marks), std::end(marks), diff.frames[k].frame) != std::end(marks);
     const std::size_t step = (diff.frames.size() + most - 1) / most;
     if (marked || k % step == 0 || k + 1 == diff.frames.size()) shown.insert(k);
   }
@@ -219,8 +214,7 @@ PourDiff pour_difference(const std::filesystem::path& before, const std::filesys
     f.spread = widest;
     diff.frames.push_back(f);
   }
-  if (diff.frames.empty())
-    pours[1]->refuse("/time", "no frame", "at least one frame that all the pours have");
+  if (diff.frames.empty()) pours[1]->refuse("/time", "no frame", "at least one frame that all the pours have");
   return diff;
 }
 
@@ -235,21 +229,19 @@ std::string pour_diff_line(const PourDiff& diff) {
   if (diff.spread_pours == 0) return line;
   const auto beyond = diff.beyond();
   if (beyond.frame < 0) return line + fmt::format(": within the spread of {} pours", diff.spread_pours);
-  return line + fmt::format(": beyond the spread of {} pours in frame {} by {}, {:.3g} times",
-                            diff.spread_pours, beyond.frame,
-                            pour_fields[beyond.field], beyond.times);
+  return line + fmt::format(": beyond the spread of {} pours in frame {} by {}, {:.3g} times", diff.spread_pours,
+                            beyond.frame, pour_fields[beyond.field], beyond.times);
 }
 
 std::string pour_diff_text(const PourDiff& diff) {
   const bool spread = diff.spread_pours > 0;
-  std::string text = fmt::format("{:>6} {:>9}  {:>9} {:>9} {:>9} {:>9} {:>9} {:>9}{}\n", "frame",
-                                 "time (s)", "rms (dx)", "max (dx)", "m/s", "kg/m^3", "Pa",
-                                 "elsewhere", spread ? "  of the spread" : "");
+  std::string text =
+      fmt::format("{:>6} {:>9}  {:>9} {:>9} {:>9} {:>9} {:>9} {:>9}{}\n", "frame", "time (s)", "rms (dx)", "max (dx)",
+                  "m/s", "kg/m^3", "Pa", "elsewhere", spread ? "  of the spread" : "");
   for (const std::size_t k : shown_frames(diff)) {
     const FrameDifference& f = diff.frames[k];
-    text += fmt::format("{:>6} {:>9.5g}  {:>9.3g} {:>9.3g} {:>9.3g} {:>9.3g} {:>9.3g} {:>9}",
-                        f.frame, f.time, f.distance[0], f.farthest, f.distance[1], f.distance[2],
-                        f.distance[3], f.distance[4]);
+    text += fmt::format("{:>6} {:>9.5g}  {:>9.3g} {:>9.3g} {:>9.3g} {:>9.3g} {:>9.3g} {:>9}", f.frame, f.time,
+                        f.distance[0], f.farthest, f.distance[1], f.distance[2], f.distance[3], f.distance[4]);
     if (spread) {
       double most = 0;
       std::size_t field = 0;
@@ -261,8 +253,7 @@ std::string pour_diff_text(const PourDiff& diff) {
           field = d;
         }
       }
-      text += most == 0 ? fmt::format("  {:>6}", 0)
-                        : fmt::format("  {:>6.3g} {}", most, pour_fields[field]);
+      text += most == 0 ? fmt::format("  {:>6}", 0) : fmt::format("  {:>6.3g} {}", most, pour_fields[field]);
     }
     while (text.back() == ' ') text.pop_back();
     text += '\n';

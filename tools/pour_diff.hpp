@@ -17,25 +17,24 @@ namespace decant {
 /// not judged, because one number of a few pours may be near by chance.
 inline constexpr std::array<const char*, 6> pour_fields = {"position", "velocity",  "density",
                                                            "pressure", "elsewhere", "kinetic_energy"};
-inline constexpr std::array<const char*, 6> pour_field_units = {"dx", "m/s", "kg/m^3",
-                                                                "Pa", "particles", "J"};
+inline constexpr std::array<const char*, 6> pour_field_units = {"dx", "m/s", "kg/m^3", "Pa", "particles", "J"};
 inline constexpr std::size_t judged_pour_fields = 5;
 using FieldDistances = std::array<double, pour_fields.size()>;
 
 struct FrameDifference {
   std::int64_t frame = 0;
-  double time = 0;               // s
-  FieldDistances distance{};     // of the two; NaN where a value of either is no number
-  double farthest = 0;           // dx, the largest |x_a − x_b|
+  double time = 0;            // s
+  FieldDistances distance{};  // of the two; NaN where a value of either is no number
+  double farthest = 0;        // dx, the largest |x_a − x_b|
   std::int64_t farthest_particle = -1;
-  FieldDistances spread{};       // the largest distance of any two pours of the spread until then
+  FieldDistances spread{};  // the largest distance of any two pours of the spread until then
 };
 
 /// Two pours apart.
 struct PourDiff {
   std::int64_t particles = 0;
-  std::int64_t frames_missing = 0;   // of the scene's, not written in both
-  std::int64_t spread_pours = 0;     // BEFORE and those given beside; 0: no spread is known
+  std::int64_t frames_missing = 0;  // of the scene's, not written in both
+  std::int64_t spread_pours = 0;    // BEFORE and those given beside; 0: no spread is known
   double factor = 3;
   std::vector<FrameDifference> frames;
 

@@ -16,13 +16,12 @@ namespace fs = std::filesystem;
 namespace {
 
 std::int64_t bytes_on_disk(const fs::path& file) {
-  struct stat found {};
+  struct stat found{};
   return ::stat(file.c_str(), &found) == 0 ? std::int64_t{512} * found.st_blocks : 0;
 }
 
 std::string size_text(double bytes) {
-  return bytes >= 1e9 ? fmt::format("{:.1f} GB", 1e-9 * bytes)
-                      : fmt::format("{:.1f} MB", 1e-6 * bytes);
+  return bytes >= 1e9 ? fmt::format("{:.1f} GB", 1e-9 * bytes) : fmt::format("{:.1f} MB", 1e-6 * bytes);
 }
 
 }  // namespace
@@ -31,15 +30,12 @@ void check_pour_folder(const PourOptions& options, const PourFiles& files) {
   const auto refuse = [&](const char* option, const char* why) {
     throw InputError("command line", option, options.out.string(), why);
   };
-  if (fs::exists(options.out) && !fs::is_directory(options.out))
-    refuse("--out", "must be a folder");
+  if (fs::exists(options.out) && !fs::is_directory(options.out)) refuse("--out", "must be a folder");
   const bool unfinished = fs::exists(files.checkpoint);
   const bool complete = fs::exists(files.frames) && !unfinished;
-  if (options.resume && complete)
-    refuse("--resume", "holds a complete pour, nothing is left to do");
+  if (options.resume && complete) refuse("--resume", "holds a complete pour, nothing is left to do");
   if (options.resume && !unfinished) refuse("--resume", "holds no checkpoint.h5 to resume from");
-  if (!options.resume && unfinished)
-    refuse("--out", "holds an unfinished pour; add --resume, or name another folder");
+  if (!options.resume && unfinished) refuse("--out", "holds an unfinished pour; add --resume, or name another folder");
   if (!options.resume && complete) refuse("--out", "holds a pour already; name another folder");
 }
 
@@ -49,15 +45,12 @@ void check_room(const PourOptions& options, const PourFiles& files, const FrameL
   // Checkpoints: state in double, twice while one replaces the other. Per frame: XDMF and timeline.
   const std::int64_t beside = 2 * 48 * layout.particles + 4000 * layout.frames;
   const double needed =
-      static_cast<double>(
-          std::max<std::int64_t>(frame_file_bytes(layout) - bytes_on_disk(files.partial), 0) +
-          beside) +
+      static_cast<double>(std::max<std::int64_t>(frame_file_bytes(layout) - bytes_on_disk(files.partial), 0) + beside) +
       (options.csv ? share * static_cast<double>(csv_bytes(layout)) : 0.0);
   fs::path there = fs::absolute(options.out);
   while (!fs::exists(there) && there.has_relative_path()) there = there.parent_path();
   const auto available = static_cast<double>(fs::space(there).available);
-  if (!options.quiet)
-    fmt::print(stderr, "disk: needs {}, {} free\n", size_text(needed), size_text(available));
+  if (!options.quiet) fmt::print(stderr, "disk: needs {}, {} free\n", size_text(needed), size_text(available));
   if (!(needed <= available))
     throw InputError("command line", "--out", options.out.string(),
                      fmt::format("needs {}, free are {}", size_text(needed), size_text(available)));

@@ -69,28 +69,24 @@ std::string pour_json(const PourResult& result, const BackendInfo& info, const s
 
 void print_pour(const PourResult& result, const BackendInfo& info, const Scene& scene) {
   const PourSummary& s = result.summary;
-  fmt::print("{}: {} particles, {} frames, {} substeps of {:.3g} s; {} ({}) on {}\n", scene.name,
-             s.particles, s.frames, s.substeps, scene.time_step(), info.name, info.precision,
-             info.device);
+  fmt::print("{}: {} particles, {} frames, {} substeps of {:.3g} s; {} ({}) on {}\n", scene.name, s.particles, s.frames,
+             s.substeps, scene.time_step(), info.name, info.precision, info.device);
   for (std::size_t p = 0; p < place_names.size(); ++p)
-    fmt::print("  {:<10} {:9.3f} g {:7.2f} %\n", place_names[p], 1e3 * s.mass_at[p],
-               1e2 * s.fraction_at[p]);
-  fmt::print("  {:<10} {:9.3f} g, {}\n", "all", 1e3 * s.mass,
-             s.balanced() ? "added up at every frame"
-                          : fmt::format("DID NOT ADD UP at {} frames", s.unbalanced_frames));
+    fmt::print("  {:<10} {:9.3f} g {:7.2f} %\n", place_names[p], 1e3 * s.mass_at[p], 1e2 * s.fraction_at[p]);
+  fmt::print(
+      "  {:<10} {:9.3f} g, {}\n", "all", 1e3 * s.mass,
+      s.balanced() ? "added up at every frame" : fmt::format("DID NOT ADD UP at {} frames", s.unbalanced_frames));
   if (s.penetrated())
     fmt::print(
         "  walls      PENETRATED first at frame {} by particle {}; {} frames with particles "
         "inside a wall, {} crossings, deepest {:.3g} mm\n",
         s.penetration_frame, s.penetration_particle, s.frames_inside, s.crossings, 1e3 * s.deepest);
-  else
-    fmt::print("  walls      nothing inside a wall and nothing through one at any frame\n");
-  fmt::print("  energy     kinetic {:.3g} J at the end, peak {:.3g} J at {:.3f} s\n",
-             s.final_kinetic_energy, s.peak_kinetic_energy, s.peak_kinetic_time);
+  else fmt::print("  walls      nothing inside a wall and nothing through one at any frame\n");
+  fmt::print("  energy     kinetic {:.3g} J at the end, peak {:.3g} J at {:.3f} s\n", s.final_kinetic_energy,
+             s.peak_kinetic_energy, s.peak_kinetic_time);
   fmt::print("  extremes   {:.3g} m/s, {:.1f} kg/m³\n", s.max_speed, s.max_density);
   for (const LimitExceeded& e : result.limits_exceeded)
-    fmt::print("  BEYOND     {}; {} frames, at most {:.4g} {}\n", describe(e), e.frames, e.largest,
-               e.unit);
+    fmt::print("  BEYOND     {}; {} frames, at most {:.4g} {}\n", describe(e), e.frames, e.largest, e.unit);
   fmt::print("  time       {} in all; solver {:.4g} µs a substep", duration_text(s.wall_seconds),
              1e6 * s.seconds_per_substep);
   for (const StageName& stage : stage_names)

@@ -16,12 +16,10 @@ ParticleState disturbed_start(ParticleState state, std::uint32_t seed) {
 }
 
 Scene with_frames(Scene scene, int frames) {
-  const std::int64_t substeps =
-      std::int64_t{scene.schedule.frames} * scene.schedule.substeps_per_frame;
+  const std::int64_t substeps = std::int64_t{scene.schedule.frames} * scene.schedule.substeps_per_frame;
   scene.schedule.frames = frames;
-  scene.schedule.substeps_per_frame = scene.schedule.substeps_derived
-                                          ? substeps_for(scene)
-                                          : static_cast<int>((substeps + frames - 1) / frames);
+  scene.schedule.substeps_per_frame =
+      scene.schedule.substeps_derived ? substeps_for(scene) : static_cast<int>((substeps + frames - 1) / frames);
   return scene;
 }
 

@@ -27,11 +27,7 @@ std::string duration_text(double seconds) {
 }
 
 Progress::Progress(std::string what, std::int64_t total, std::int64_t done, bool quiet)
-    : what_(std::move(what)),
-      total_(total),
-      first_(done),
-      quiet_(quiet),
-      terminal_(::isatty(STDERR_FILENO) == 1) {}
+    : what_(std::move(what)), total_(total), first_(done), quiet_(quiet), terminal_(::isatty(STDERR_FILENO) == 1) {}
 
 Progress::~Progress() { pause(); }
 
@@ -40,20 +36,15 @@ void Progress::update(std::int64_t done, const std::string& note) {
   const auto now = Clock::now();
   const bool first = done <= first_, last = done >= total_;
   const double since = std::chrono::duration<double>(now - last_).count();
-  if (!first && !last && since < (terminal_ ? seconds_between_draws : seconds_between_lines))
-    return;
+  if (!first && !last && since < (terminal_ ? seconds_between_draws : seconds_between_lines)) return;
   last_ = now;
   const double elapsed = std::chrono::duration<double>(now - start_).count();
   std::string left;
-  if (last)
-    left = "took " + duration_text(elapsed);
+  if (last) left = "took " + duration_text(elapsed);
   else if (!first)
-    left = duration_text(elapsed * static_cast<double>(total_ - done) /
-                         static_cast<double>(done - first_)) +
-           " left";
-  const std::string text =
-      fmt::format("{} {}/{}{}{}{}{}", what_, done, total_, left.empty() ? "" : ", ", left,
-                  note.empty() ? "" : ", ", note);
+    left = duration_text(elapsed * static_cast<double>(total_ - done) / static_cast<double>(done - first_)) + " left";
+  const std::string text = fmt::format("{} {}/{}{}{}{}{}", what_, done, total_, left.empty() ? "" : ", ", left,
+                                       note.empty() ? "" : ", ", note);
   if (!terminal_) {
     fmt::print(stderr, "{}\n", text);
     return;

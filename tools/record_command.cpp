@@ -51,14 +51,13 @@ constexpr const char* footer =
 /// Where the run starts.
 struct Start {
   ParticleState state;
-  std::string phase;   // of a fixture, else empty
-  std::string origin;  // for the provenance
+  std::string phase;                              // of a fixture, else empty
+  std::string origin;                             // for the provenance
   std::map<std::string, std::string> provenance;  // of a fixture
 };
 
 /// The last frame of a finished pour at or before the first phase asked for.
-ParticleState state_in_frames(const Hdf5Reader& frames, const Scene& scene,
-                              const std::vector<std::string>& phases) {
+ParticleState state_in_frames(const Hdf5Reader& frames, const Scene& scene, const std::vector<std::string>& phases) {
   const std::string file = frames.file().string();
   const std::string sha256 = sha256_of_text(scene_to_json(scene));
   if (frames.text_attribute("/", "scene_sha256") != sha256)
@@ -84,11 +83,9 @@ ParticleState plain_state(const Hdf5Reader& reader, const Scene& scene) {
   state.position = reader.matrix3("/position");
   state.velocity = reader.matrix3("/velocity", state.position.cols());
   if (reader.has_attribute("/", "time"))
-    state.substep =
-        parse_phase(scene, fmt::format("state={}", reader.real_attribute("/", "time"))).substep;
+    state.substep = parse_phase(scene, fmt::format("state={}", reader.real_attribute("/", "time"))).substep;
   if (!state.position.allFinite() || !state.velocity.allFinite())
-    throw InputError(reader.file().string(), "/position and /velocity", "not finite",
-                     "finite numbers");
+    throw InputError(reader.file().string(), "/position and /velocity", "not finite", "finite numbers");
   return state;
 }
 
@@ -97,19 +94,25 @@ Start start_of(const RecordArguments& arguments, const Scene& scene) {
   const std::string& file = arguments.from;
   const Hdf5Reader reader(file);
   if (reader.has("/position"))
-    return {plain_state(reader, scene), {},
-            std::filesystem::path(file).filename().string() + " " + sha256_of_file(file), {}};
+    return {plain_state(reader, scene),
+            {},
+            std::filesystem::path(file).filename().string() + " " + sha256_of_file(file),
+            {}};
   if (reader.has("/fluid/position")) {
     const auto name = [&](const char* attribute) { return reader.text_attribute("/", attribute); };
-    return {state_in_frames(reader, scene, arguments.phases), {},
-            fmt::format("a frame of {} on {} ({}, {})", name("backend"), name("device"),
-                        name("executor"), name("precision")), {}};
+    return {state_in_frames(reader, scene, arguments.phases),
+            {},
+            fmt::format("a frame of {} on {} ({}, {})", name("backend"), name("device"), name("executor"),
+                        name("precision")),
+            {}};
   }
   const auto take = [&](ParticleState state, const std::string& scene_json, std::string phase) {
     if (scene_json != scene_to_json(scene))
       throw InputError(file, "scene", "another scene", "the scene of " + arguments.scene);
-    return Start{std::move(state), std::move(phase),
-                 std::filesystem::path(file).filename().string() + " " + sha256_of_file(file), {}};
+    return Start{std::move(state),
+                 std::move(phase),
+                 std::filesystem::path(file).filename().string() + " " + sha256_of_file(file),
+                 {}};
   };
   if (reader.has_attribute("/", "decant_fixture")) {
     Fixture fixture = read_fixture(file);
@@ -121,8 +124,7 @@ Start start_of(const RecordArguments& arguments, const Scene& scene) {
   return take(std::move(checkpoint.state), checkpoint.scene_json, {});
 }
 
-std::vector<Phase> phases_of(const RecordArguments& arguments, const Scene& scene,
-                             const Start& start) {
+std::vector<Phase> phases_of(const RecordArguments& arguments, const Scene& scene, const Start& start) {
   const bool named_by_phase = arguments.out.find("{phase}") != std::string::npos;
   std::vector<Phase> phases;
   for (const auto& text : arguments.phases) phases.push_back(parse_phase(scene, text));
@@ -135,13 +137,11 @@ std::vector<Phase> phases_of(const RecordArguments& arguments, const Scene& scen
 
   if (phases.size() > 1 && !named_by_phase)
     throw InputError("command line", "--out", arguments.out, "{phase} in it, for several phases");
-  std::stable_sort(phases.begin(), phases.end(),
-                   [](const Phase& a, const Phase& b) { return a.substep < b.substep; });
+  std::stable_sort(phases.begin(), phases.end(), [](const Phase& a, const Phase& b) { return a.substep < b.substep; });
   for (std::size_t k = 0; k < phases.size(); ++k) {
     if (phases[k].substep < start.state.substep)
-      throw InputError(
-          "command line", "--phase", phases[k].name,
-          fmt::format("at or after {}, substep {}", start.origin, start.state.substep));
+      throw InputError("command line", "--phase", phases[k].name,
+                       fmt::format("at or after {}, substep {}", start.origin, start.state.substep));
     for (std::size_t earlier = 0; earlier < k; ++earlier)
       if (phases[earlier].name == phases[k].name)
         throw InputError("command line", "--phase", phases[k].name, "each name once");
@@ -151,8 +151,7 @@ std::vector<Phase> phases_of(const RecordArguments& arguments, const Scene& scen
 
 /// Where a state is beyond what the scene's time step and speed of sound were chosen for.
 /// \param density  N, kg/m³, the oracle's
-std::vector<std::string> beyond_limits(const Scene& scene, const ParticleState& state,
-                                       const Eigen::VectorXd& density) {
+std::vector<std::string> beyond_limits(const Scene& scene, const ParticleState& state, const Eigen::VectorXd& density) {
   if (state.size() == 0) return {};
   TimelineRow row;
   Eigen::Index fastest = -1, densest = -1;
@@ -166,23 +165,22 @@ std::vector<std::string> beyond_limits(const Scene& scene, const ParticleState& 
   return all;
 }
 
-void advance_to(std::int64_t target, std::int64_t& now, const Scene& scene, Backend& backend,
-                Progress& progress, const std::string& phase) {
+void advance_to(std::int64_t target, std::int64_t& now, const Scene& scene, Backend& backend, Progress& progress,
+                const std::string& phase) {
   const std::int64_t per_frame = scene.schedule.substeps_per_frame;
   while (now < target) {
     // As `pour` does, whole frames at a time: backends rebuild their neighbors at frame starts.
     const std::int64_t chunk = std::min(target - now, per_frame - now % per_frame);
     const Status status = backend.advance(static_cast<int>(chunk));
     if (!status.ok())
-      throw BackendError(
-          fmt::format("{} on the way to {}: {}", backend.info().name, phase, describe(status)));
+      throw BackendError(fmt::format("{} on the way to {}: {}", backend.info().name, phase, describe(status)));
     now += chunk;
     progress.update(now, phase);
   }
 }
 
-std::map<std::string, std::string> provenance_of(const RecordArguments& arguments,
-                                                 const BackendInfo& info, const Start& start) {
+std::map<std::string, std::string> provenance_of(const RecordArguments& arguments, const BackendInfo& info,
+                                                 const Start& start) {
   auto provenance = build_provenance();
   provenance.insert({
       {"scene_file", std::filesystem::path(arguments.scene).filename().string()},
@@ -204,8 +202,7 @@ int record(const RecordArguments& arguments) {
   const auto backend = choose_backend(arguments.backend, arguments.executor);
   const BackendInfo info = backend->info();
   if (!arguments.quiet)
-    fmt::print("{} ({}) on {}: {} particles\n", info.name, info.precision, info.device,
-               start.state.size());
+    fmt::print("{} ({}) on {}: {} particles\n", info.name, info.precision, info.device, start.state.size());
   std::fflush(stdout);
 
   if (!arguments.quiet && !arguments.from.empty()) {
@@ -231,8 +228,7 @@ int record(const RecordArguments& arguments) {
     fixture.scene = scene;
     backend->read(fixture.state);
     fixture.state.substep = now;
-    const std::string weakness =
-        record_answer(fixture, arguments.ensemble_substeps, arguments.ensemble_members);
+    const std::string weakness = record_answer(fixture, arguments.ensemble_substeps, arguments.ensemble_members);
     const auto beyond = beyond_limits(scene, fixture.state, fixture.fields->density);
     if (arguments.sample) reduce_to_sample(fixture);
     fixture.provenance = provenance_of(arguments, info, start);
@@ -245,8 +241,8 @@ int record(const RecordArguments& arguments) {
     write_fixture(file, fixture);
     progress.pause();
     if (!arguments.quiet)
-      fmt::print("{}: {} at {:.6g} s, substep {}, {} bytes\n", file, phase.name, scene.time_at(now),
-                 now, std::filesystem::file_size(file));
+      fmt::print("{}: {} at {:.6g} s, substep {}, {} bytes\n", file, phase.name, scene.time_at(now), now,
+                 std::filesystem::file_size(file));
     if (!arguments.quiet)
       for (const std::string& one : beyond) fmt::print(stderr, "warning: {}: {}\n", file, one);
     if (!weakness.empty()) fmt::print(stderr, "warning: {}: {}\n", file, weakness);
@@ -262,14 +258,12 @@ void add_record_command(CLI::App& app, int& exit_status) {
   CLI::App* verb = app.add_subcommand("record", "run a scene and write fixtures");
   verb->footer(footer);
   verb->add_option("SCENE", arguments->scene, "scene file (*.json)")->required();
-  verb->add_option("--out", arguments->out, "file to write; {phase} in it becomes the phase's name")
-      ->required();
-  verb->add_option("--phase", arguments->phases, "NAME or NAME=TIME (s); may be repeated")
-      ->allow_extra_args(false);
-  verb->add_option("--from", arguments->from, "start from a frames.h5, a checkpoint.h5, a fixture, or any HDF5 file with\n"
+  verb->add_option("--out", arguments->out, "file to write; {phase} in it becomes the phase's name")->required();
+  verb->add_option("--phase", arguments->phases, "NAME or NAME=TIME (s); may be repeated")->allow_extra_args(false);
+  verb->add_option("--from", arguments->from,
+                   "start from a frames.h5, a checkpoint.h5, a fixture, or any HDF5 file with\n"
                    "/position and /velocity, [N,3], and an attribute time");
-  verb->add_option("--backend", arguments->backend, "what moves the fluid: reference, brute, …")
-      ->capture_default_str();
+  verb->add_option("--backend", arguments->backend, "what moves the fluid: reference, brute, …")->capture_default_str();
   verb->add_option("--executor", arguments->executor, "auto, cuda or host")->capture_default_str();
   verb->add_flag("--sample", arguments->sample, "study scale: a digest and a sample of the fields");
   verb->add_option("--ensemble-substeps", arguments->ensemble_substeps,

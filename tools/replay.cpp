@@ -26,13 +26,12 @@ std::string plain(std::string text) {
 
 std::string name_of(const CheckRow& row) {
   const std::string options = row.options.empty() ? "" : ":" + row.options;
-  return fmt::format("{}-{}-{}-{}-{}.h5", plain(row.fixture), plain(row.backend + options),
-                     plain(row.check), plain(row.field), row.worst_id);
+  return fmt::format("{}-{}-{}-{}-{}.h5", plain(row.fixture), plain(row.backend + options), plain(row.check),
+                     plain(row.field), row.worst_id);
 }
 
 bool can_be_replayed(const CheckRow& row) {
-  return judged_verdict(row) == Verdict::fail && is_located(row) &&
-         (!is_of_walls(row) || row.fluid_neighbors > 0);
+  return judged_verdict(row) == Verdict::fail && is_located(row) && (!is_of_walls(row) || row.fluid_neighbors > 0);
 }
 
 }  // namespace
@@ -44,19 +43,16 @@ std::vector<Replay> replays_of(const Report& report, const std::filesystem::path
     const CheckRow& row = report.rows[k];
     if (!can_be_replayed(row)) continue;
     const Replay replay{k, folder / name_of(row)};
-    const auto [found, fresh] =
-        known.emplace(std::pair{backend_label(row), row.fixture}, replays.size());
-    if (fresh)
-      replays.push_back(replay);
-    else if (Replay& first = replays[found->second];
-             is_of_walls(report.rows[first.row]) && !is_of_walls(row))
+    const auto [found, fresh] = known.emplace(std::pair{backend_label(row), row.fixture}, replays.size());
+    if (fresh) replays.push_back(replay);
+    else if (Replay& first = replays[found->second]; is_of_walls(report.rows[first.row]) && !is_of_walls(row))
       first = replay;
   }
   return replays;
 }
 
-std::string write_replay(const std::filesystem::path& file, const Fixture& fixture,
-                         const CheckRow& row, std::string& warning) {
+std::string write_replay(const std::filesystem::path& file, const Fixture& fixture, const CheckRow& row,
+                         std::string& warning) {
   Cut cut = cut_out(fixture, row, replay_radius * fixture.scene.support_radius());
   Fixture& f = cut.fixture;
   warning = record_answer(f, fixture.ensemble.substeps, fixture.ensemble.members);
@@ -64,14 +60,11 @@ std::string write_replay(const std::filesystem::path& file, const Fixture& fixtu
   const std::string kind = is_of_walls(row) ? "wall particle" : "particle";
   f.provenance["cut_out_of"] = fixture.name + " " + fixture.sha256;
   f.provenance["cut_around"] =
-      fmt::format("{} {}{}", kind, row.worst_id,
-                  cut.particle < 0 ? "" : fmt::format(", here {}", cut.particle));
+      fmt::format("{} {}{}", kind, row.worst_id, cut.particle < 0 ? "" : fmt::format(", here {}", cut.particle));
   f.provenance["cut_radius"] = fmt::format("{:g} H", replay_radius);
-  f.provenance["cut_because"] =
-      fmt::format("{}: {}, score {:.4g}", backend_label(row), check_label(row), row.score);
+  f.provenance["cut_because"] = fmt::format("{}: {}, score {:.4g}", backend_label(row), check_label(row), row.score);
   write_fixture(file, f);
-  return fmt::format("{}: the {} particles around {}", file.string(), f.state.size(),
-                     f.provenance["cut_around"]);
+  return fmt::format("{}: the {} particles around {}", file.string(), f.state.size(), f.provenance["cut_around"]);
 }
 
 }  // namespace decant

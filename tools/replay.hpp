@@ -30,7 +30,7 @@ std::vector<Replay> replays_of(const Report& report, const std::filesystem::path
 /// Writes one (fixture.hpp); the provenance says what it was cut out of and why. Returns a line
 /// about it, and in `warning` why no backend can pass on it, where that is so. Throws
 /// std::runtime_error naming the file.
-std::string write_replay(const std::filesystem::path& file, const Fixture& fixture,
-                         const CheckRow& row, std::string& warning);
+std::string write_replay(const std::filesystem::path& file, const Fixture& fixture, const CheckRow& row,
+                         std::string& warning);
 
 }  // namespace decant

@@ -26,8 +26,7 @@ CheckSelection checks_of(const ResultsRequest& request) {
   return checks;
 }
 
-JudgedResults judge_on_fixture(const ResultsRequest& request, const std::string& name,
-                               Report& report) {
+JudgedResults judge_on_fixture(const ResultsRequest& request, const std::string& name, Report& report) {
   if (request.fixtures.size() != 1)
     throw InputError("command line", "FIXTURE", fmt::format("{} of them", request.fixtures.size()),
                      "the one that --results was computed from (or --oracle)");
@@ -39,11 +38,9 @@ JudgedResults judge_on_fixture(const ResultsRequest& request, const std::string&
   return judge(results, name, fixture, *oracle, checks);
 }
 
-JudgedResults judge_on_oracle(const ResultsRequest& request, const std::string& name,
-                              Report& report) {
+JudgedResults judge_on_oracle(const ResultsRequest& request, const std::string& name, Report& report) {
   if (!request.fixtures.empty())
-    throw InputError("command line", "FIXTURE", request.fixtures.front(),
-                     "either FIXTURE or --oracle");
+    throw InputError("command line", "FIXTURE", request.fixtures.front(), "either FIXTURE or --oracle");
   if (!request.checks.empty())
     throw InputError("command line", "--check", request.checks.front(),
                      "none with --oracle: their fields are one check");
@@ -51,18 +48,14 @@ JudgedResults judge_on_oracle(const ResultsRequest& request, const std::string& 
   return judge_named_fields(request.oracle, request.results, name);
 }
 
-std::string place_of(const CheckRow& row) {
-  return row.check == row.field ? row.check : row.check + " / " + row.field;
-}
+std::string place_of(const CheckRow& row) { return row.check == row.field ? row.check : row.check + " / " + row.field; }
 
 /// The table of what was given, then the names of what was not.
-std::string table_of(const Report& given, const std::vector<CheckRow>& absent,
-                     const std::string& line) {
+std::string table_of(const Report& given, const std::vector<CheckRow>& absent, const std::string& line) {
   std::string table = console_table(given);
   table.resize(table.size() - verdict_line(given).size() - 1);
   std::string names;
-  for (const CheckRow& row : absent)
-    names += fmt::format("{}{}", names.empty() ? "" : ", ", place_of(row));
+  for (const CheckRow& row : absent) names += fmt::format("{}{}", names.empty() ? "" : ", ", place_of(row));
   if (!absent.empty()) table += wrapped("not_run, not given: " + names, 0) + "\n";
   return table + line + "\n";
 }
@@ -87,12 +80,11 @@ ResultsOutcome judge_results_file(const ResultsRequest& request) {
     given.rows.push_back(std::move(row));
   }
   outcome.status = rows == 0 ? 3 : exit_status(given);
-  outcome.line = fmt::format("{}; {} rows given, {} not given and not_run",
-                             verdict_line(rows == 0 ? Report{} : given), rows,
-                             judged.absent.size());
+  outcome.line = fmt::format("{}; {} rows given, {} not given and not_run", verdict_line(rows == 0 ? Report{} : given),
+                             rows, judged.absent.size());
   if (!judged.missing_states.empty())
-    outcome.line += fmt::format("; {} of {} states missing: {}", judged.missing_states.size(),
-                                judged.states, fmt::join(judged.missing_states, ", "));
+    outcome.line += fmt::format("; {} of {} states missing: {}", judged.missing_states.size(), judged.states,
+                                fmt::join(judged.missing_states, ", "));
   outcome.table = table_of(given, judged.absent, outcome.line);
   outcome.report.rows = std::move(given.rows);
   for (CheckRow& row : judged.absent) outcome.report.rows.push_back(std::move(row));

@@ -64,7 +64,9 @@ def verdicts():
     """Largest score of some recordings by backend."""
     path = RESULTS / "h200" / "conformance.h5"
     with h5py.File(path) as file:
-        rows = {name: file[f"summary/{name}"][:] for name in ("backend", "fixture", "score", "check", "field", "verdict")}
+        rows = {
+            name: file[f"summary/{name}"][:] for name in ("backend", "fixture", "score", "check", "field", "verdict")
+        }
         provenance = {k: text(v) for k, v in file["provenance"].attrs.items()}
     backends = sorted({text(b) for b in rows["backend"]})
     fixtures = sorted({text(f) for f in rows["fixture"]})
@@ -79,16 +81,25 @@ def verdicts():
         worst = rows["score"][of].argmax()
         shown.append([f"`{fixture}`", *cells, f"{text(rows['check'][of][worst])}, {text(rows['field'][of][worst])}"])
     passed = (rows["verdict"] == b"pass").all()
-    last = f"\n\nAll {len(fixtures)} recordings × {len(backends)} backends, {len(rows['score']):,} rows: " + \
-        ("pass" if passed else "FAIL") + f", largest score {rows['score'].max():.3f}. "
-    return table(["recording", *(f"`{b}`" for b in backends), "largest in"], shown) + last + \
-        source(path, device_of(provenance["device.hash"]), provenance["git_revision"]).strip()
+    last = (
+        f"\n\nAll {len(fixtures)} recordings × {len(backends)} backends, {len(rows['score']):,} rows: "
+        + ("pass" if passed else "FAIL")
+        + f", largest score {rows['score'].max():.3f}. "
+    )
+    return (
+        table(["recording", *(f"`{b}`" for b in backends), "largest in"], shown)
+        + last
+        + source(path, device_of(provenance["device.hash"]), provenance["git_revision"]).strip()
+    )
 
 
 LADDER = [
     ("brute", "all pairs"),
     ("hash:wall_cells=off:force_neighbors=recomputed:sort=thrust", "hash, every wall particle tested, Thrust sort"),
-    ("hash:moving_walls=rebuilt:force_neighbors=recomputed:sort=thrust", "+ a grid for the fluid and one per container, the moving one rebuilt"),
+    (
+        "hash:moving_walls=rebuilt:force_neighbors=recomputed:sort=thrust",
+        "+ a grid for the fluid and one per container, the moving one rebuilt",
+    ),
     ("hash:moving_walls=rebuilt:force_neighbors=recomputed", "+ counting sort, substeps captured as a CUDA graph"),
     ("hash:force_neighbors=recomputed", "+ moving walls looked up in their own frame"),
     ("hash", "+ pairs cached for the force pass (the default)"),
@@ -104,11 +115,17 @@ LADDER = [
 def substep_times():
     rows, where = bench("bench")
     times = {(choice(r).strip("`"), r["window"]): r["substep_us"] for r in rows}
-    shown = [[f"`{name}`", what, *(significant(times[name, w]) if (name, w) in times else "" for w in ("stream", "filling"))]
-             for name, what in LADDER if any((name, w) in times for w in ("stream", "filling"))]
+    shown = [
+        [f"`{name}`", what, *(significant(times[name, w]) if (name, w) in times else "" for w in ("stream", "filling"))]
+        for name, what in LADDER
+        if any((name, w) in times for w in ("stream", "filling"))
+    ]
     particles = next(r["particles"] for r in rows)
-    return f"µs per substep, {particles:,} fluid and {rows[0]['wall_particles']:,} wall particles:\n\n" + \
-        table(["backend", "what", "stream", "filling"], shown) + where
+    return (
+        f"µs per substep, {particles:,} fluid and {rows[0]['wall_particles']:,} wall particles:\n\n"
+        + table(["backend", "what", "stream", "filling"], shown)
+        + where
+    )
 
 
 def scaling():
@@ -121,11 +138,16 @@ def scaling():
                 columns.setdefault(r["particles"], {})[r["backend"]] = r
     shown = []
     for backend in ("hash", "list"):
-        rates = [f"{r['particles'] / r['substep_us'] / 1e3:.2f}" for r in (columns[n][backend] for n in sorted(columns))]
+        rates = [
+            f"{r['particles'] / r['substep_us'] / 1e3:.2f}" for r in (columns[n][backend] for n in sorted(columns))
+        ]
         sizes = [f"{columns[n][backend]['device_bytes_per_particle']:.0f}" for n in sorted(columns)]
         shown.append([f"`{backend}`", *rates, ", ".join(sizes)])
-    return table(["10⁹ particle-substeps per second", *(f"{n:,}" for n in sorted(columns)), "bytes per particle"], shown) + \
-        "\n\n" + "\n".join(wheres)
+    return (
+        table(["10⁹ particle-substeps per second", *(f"{n:,}" for n in sorted(columns)), "bytes per particle"], shown)
+        + "\n\n"
+        + "\n".join(wheres)
+    )
 
 
 def pours():
@@ -134,12 +156,25 @@ def pours():
         path = RESULTS / "h200" / f"pour-56k-{backend}.json"
         d = json.loads(path.read_text(encoding="utf-8"))
         regions = d["places"]
-        shown.append([f"`{backend}`", significant(d["substep_us"]),
-                      *(f"{100 * regions[r]['fraction']:.3f} %" for r in ("receiver", "source", "in_flight", "spilled", "lost")),
-                      d["wall_crossings"]])
+        shown.append(
+            [
+                f"`{backend}`",
+                significant(d["substep_us"]),
+                *(
+                    f"{100 * regions[r]['fraction']:.3f} %"
+                    for r in ("receiver", "source", "in_flight", "spilled", "lost")
+                ),
+                d["wall_crossings"],
+            ]
+        )
         wheres.append(source(path, device_of(d["device"]), d["provenance"]["git_revision"]).strip())
-    return table(["backend", "µs per substep", "receiver", "source", "in flight", "spilled", "lost", "through a wall"], shown) + \
-        "\n\n" + "\n".join(wheres)
+    return (
+        table(
+            ["backend", "µs per substep", "receiver", "source", "in flight", "spilled", "lost", "through a wall"], shown
+        )
+        + "\n\n"
+        + "\n".join(wheres)
+    )
 
 
 def drift_rows():
@@ -154,16 +189,37 @@ def drift_rows():
 
 def stale_lists():
     rows, where = drift_rows()
-    index = {(p, int(i), round(float(s), 2)): k for k, (p, i, s) in enumerate(zip(rows["phase"], rows["interval"], rows["skin"]))}
+    index = {
+        (p, int(i), round(float(s), 2)): k
+        for k, (p, i, s) in enumerate(zip(rows["phase"], rows["interval"], rows["skin"]))
+    }
     shown = []
     for phase in PHASES:
         k = index[phase, 10, 0.0]
         every = index[phase, 1, 0.0]
         auto = next(j for (p, i, _), j in index.items() if p == phase and i == 0)
-        shown.append([phase, f"{100 * rows['worst_missed_share'][k]:.2f} %", f"{100 * rows['acceleration_rms'][k]:.2g} %",
-                      *(f"{rows['substep_us'][j]:.0f}" for j in (k, auto, every))])
-    return table(["phase", "pairs missed, at most", "acceleration, RMS error", "µs per substep", "adaptive", "every substep"],
-                 shown) + where
+        shown.append(
+            [
+                phase,
+                f"{100 * rows['worst_missed_share'][k]:.2f} %",
+                f"{100 * rows['acceleration_rms'][k]:.2g} %",
+                *(f"{rows['substep_us'][j]:.0f}" for j in (k, auto, every)),
+            ]
+        )
+    return (
+        table(
+            [
+                "phase",
+                "pairs missed, at most",
+                "acceleration, RMS error",
+                "µs per substep",
+                "adaptive",
+                "every substep",
+            ],
+            shown,
+        )
+        + where
+    )
 
 
 def campaigns():
@@ -173,16 +229,28 @@ def campaigns():
         with h5py.File(path) as file:
             a, t = file.attrs, file["tallies"]
             backends = sorted({renamed(text(b)) for b in t["backend"][:]} - {"scene"})
-            shown.append([device_of(text(a["device"])), ", ".join(backends), f"{int(a['cases']):,}", len(file["findings/seed"]),
-                          f"{a['cases'] / a['seconds']:.0f}", text(file["provenance"].attrs["git_revision"])])
+            shown.append(
+                [
+                    device_of(text(a["device"])),
+                    ", ".join(backends),
+                    f"{int(a['cases']):,}",
+                    len(file["findings/seed"]),
+                    f"{a['cases'] / a['seconds']:.0f}",
+                    text(file["provenance"].attrs["git_revision"]),
+                ]
+            )
     return table(["device", "backends", "cases", "counterexamples", "cases per second", "revision"], shown)
 
 
 def faults():
     """What the last lines of the tables say."""
     shown = []
-    for what, path in (("planted, host", "host/faults.txt"), ("planted, H200", "h200/faults.txt"),
-                       ("held out, host", "host/heldout.txt"), ("mutations, host", "host/mutants.txt")):
+    for what, path in (
+        ("planted, host", "host/faults.txt"),
+        ("planted, H200", "h200/faults.txt"),
+        ("held out, host", "host/heldout.txt"),
+        ("mutations, host", "host/mutants.txt"),
+    ):
         lines = (RESULTS / path).read_text(encoding="utf-8").strip().split("\n")
         revision = next((m[1] for line in lines[:3] if (m := re.search(r"revision ([0-9a-f]{7})", line))), "")
         shown.append([what, lines[-1], revision, f"`fixtures/results/{path}`"])
@@ -204,8 +272,16 @@ def gates():
     return table(["case", "gates met", "missed", "reported without a gate"], shown) + source(path, device, revision)
 
 
-TABLES = {"verdicts": verdicts, "substep-times": substep_times, "scaling": scaling, "pours": pours,
-          "stale-lists": stale_lists, "campaigns": campaigns, "faults": faults, "gates": gates}
+TABLES = {
+    "verdicts": verdicts,
+    "substep-times": substep_times,
+    "scaling": scaling,
+    "pours": pours,
+    "stale-lists": stale_lists,
+    "campaigns": campaigns,
+    "faults": faults,
+    "gates": gates,
+}
 BLOCK = re.compile(r"(<!-- results: ([a-z-]+) -->\n).*?(<!-- /results -->)", re.DOTALL)
 
 
@@ -214,6 +290,7 @@ def filled(document, path):
         if match[2] not in TABLES:
             sys.exit(f"{path}: results: {match[2]}: one of {', '.join(TABLES)}")
         return f"{match[1]}\n{TABLES[match[2]]()}\n\n{match[3]}"
+
     return BLOCK.sub(block, document)
 
 
@@ -226,7 +303,9 @@ def main():
     if arguments.list:
         print("\n".join(TABLES))
         return 0
-    documents = arguments.document or [p for folder in ("*.md", "*/*.md", "fixtures/results/*.md") for p in sorted(ROOT.glob(folder))]
+    documents = arguments.document or [
+        p for folder in ("*.md", "*/*.md", "fixtures/results/*.md") for p in sorted(ROOT.glob(folder))
+    ]
     differ = 0
     for path in documents:
         before = path.read_text(encoding="utf-8")
@@ -235,7 +314,9 @@ def main():
             continue
         differ += 1
         if arguments.check:
-            sys.stdout.writelines(difflib.unified_diff(before.splitlines(True), after.splitlines(True), str(path), "its data"))
+            sys.stdout.writelines(
+                difflib.unified_diff(before.splitlines(True), after.splitlines(True), str(path), "its data")
+            )
         else:
             path.write_text(after, encoding="utf-8")
             print(f"{path}: filled in")

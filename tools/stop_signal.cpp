@@ -18,7 +18,7 @@ extern "C" void on_signal(int signal) {
 
 StopSignal::StopSignal() {
   caught_signal = 0;
-  struct sigaction action {};
+  struct sigaction action{};
   action.sa_handler = on_signal;
   action.sa_flags = SA_RESTART;
   sigaction(SIGINT, &action, &before_int_);

@@ -18,8 +18,7 @@ class StopSignal {
   static int caught();
 
  private:
-  struct sigaction before_int_ {
-  }, before_term_{};
+  struct sigaction before_int_{}, before_term_{};
 };
 
 }  // namespace decant

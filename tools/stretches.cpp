@@ -14,18 +14,16 @@ namespace {
 /// further than two walls are thick, at the speed to expect, may turn on its way.
 std::int64_t looks_per_frame(const Scene& scene) {
   double thinnest = INFINITY;
-  for (const Container& container : scene.containers)
-    thinnest = std::min(thinnest, container.wall_thickness);
-  const double way = expected_max_speed(scene) * scene.time_step() *
-                     static_cast<double>(scene.schedule.substeps_per_frame);
+  for (const Container& container : scene.containers) thinnest = std::min(thinnest, container.wall_thickness);
+  const double way =
+      expected_max_speed(scene) * scene.time_step() * static_cast<double>(scene.schedule.substeps_per_frame);
   return std::clamp<std::int64_t>(static_cast<std::int64_t>(std::ceil(way / (2 * thinnest))), 1,
                                   scene.schedule.substeps_per_frame);
 }
 
 }  // namespace
 
-Stretches::Stretches(const Scene& scene)
-    : all_(scene.schedule.substeps_per_frame), looks_(looks_per_frame(scene)) {}
+Stretches::Stretches(const Scene& scene) : all_(scene.schedule.substeps_per_frame), looks_(looks_per_frame(scene)) {}
 
 std::int64_t Stretches::look_of(std::int64_t done) const {
   std::int64_t k = done * looks_ / all_;
@@ -41,9 +39,7 @@ std::int64_t Stretches::end_of(std::int64_t done) const {
     if (const std::int64_t end = begin + length * part / parts; end > done) return end;
 }
 
-bool Stretches::looks_at(std::int64_t done) const {
-  return done == all_ || look(look_of(done)) == done;
-}
+bool Stretches::looks_at(std::int64_t done) const { return done == all_ || look(look_of(done)) == done; }
 
 bool Stretches::meet_at(std::int64_t done) const {
   if (looks_at(done)) return true;

@@ -17,7 +17,7 @@ namespace {
 
 struct RealColumn {
   const char *name, *unit, *description;
-  double TimelineRow::*member;
+  double TimelineRow::* member;
 };
 constexpr RealColumn real_columns[] = {
     {"time", "s", "time of the frame", &TimelineRow::time},
@@ -34,7 +34,7 @@ constexpr RealColumn real_columns[] = {
 
 struct IntegerColumn {
   const char *name, *description;
-  std::int64_t TimelineRow::*member;
+  std::int64_t TimelineRow::* member;
 };
 constexpr IntegerColumn integer_columns[] = {
     {"frame", "number of the frame; 0 is the initial state", &TimelineRow::frame},
@@ -43,8 +43,7 @@ constexpr IntegerColumn integer_columns[] = {
     {"fastest_particle", "particle of the largest speed, or -1", &TimelineRow::fastest_particle},
     {"densest_particle", "particle of the largest density, or -1", &TimelineRow::densest_particle},
     {"inside", "particles inside a solid", &TimelineRow::inside},
-    {"crossed", "particles whose path since the frame before leads through a wall",
-     &TimelineRow::crossed},
+    {"crossed", "particles whose path since the frame before leads through a wall", &TimelineRow::crossed},
     {"first_crossed", "the first of them, or -1", &TimelineRow::first_crossed},
 };
 
@@ -57,12 +56,12 @@ Values column(const Rows& rows, Get get) {
 
 }  // namespace
 
-TimelineRow timeline_row(std::int64_t frame, const Scene& scene, const ParticleState& state,
-                         const Fields& fields, const AuditResult& audit) {
+TimelineRow timeline_row(std::int64_t frame, const Scene& scene, const ParticleState& state, const Fields& fields,
+                         const AuditResult& audit) {
   for (Eigen::Index i = 0; i < state.size(); ++i)
     if (!std::isfinite(fields.density[i]) || !std::isfinite(fields.pressure[i]))
-      throw BackendError(fmt::format("particle {}, substep {}: density {}, pressure {}", i,
-                                     state.substep, fields.density[i], fields.pressure[i]));
+      throw BackendError(fmt::format("particle {}, substep {}: density {}, pressure {}", i, state.substep,
+                                     fields.density[i], fields.pressure[i]));
   TimelineRow row;
   row.frame = frame;
   row.substep = state.substep;
@@ -96,17 +95,15 @@ StageTimes operator+(const StageTimes& a, const StageTimes& b) {
 
 void Timeline::write(Hdf5Writer& out, const std::string& group) const {
   for (const RealColumn& c : real_columns)
-    out.vector(group + "/" + c.name,
-               column<Eigen::VectorXd>(rows, [&](const TimelineRow& r) { return r.*c.member; }),
+    out.vector(group + "/" + c.name, column<Eigen::VectorXd>(rows, [&](const TimelineRow& r) { return r.*c.member; }),
                c.unit, c.description);
   for (const IntegerColumn& c : integer_columns)
-    out.integers(group + "/" + c.name,
-                 column<IdVector>(rows, [&](const TimelineRow& r) { return r.*c.member; }),
+    out.integers(group + "/" + c.name, column<IdVector>(rows, [&](const TimelineRow& r) { return r.*c.member; }),
                  c.description);
   for (std::size_t p = 0; p < place_names.size(); ++p) {
     out.vector(group + "/mass/" + place_names[p],
-               column<Eigen::VectorXd>(rows, [&](const TimelineRow& r) { return r.mass_at[p]; }),
-               "kg", "fluid at this place");
+               column<Eigen::VectorXd>(rows, [&](const TimelineRow& r) { return r.mass_at[p]; }), "kg",
+               "fluid at this place");
     out.integers(group + "/particles/" + place_names[p],
                  column<IdVector>(rows, [&](const TimelineRow& r) { return r.particles_at[p]; }),
                  "particles at this place");
@@ -115,13 +112,11 @@ void Timeline::write(Hdf5Writer& out, const std::string& group) const {
               {stage_names[0].name, stage_names[1].name, stage_names[2].name, stage_names[3].name},
               "stage of a substep");
   out.vector(group + "/stages/seconds",
-             column<Eigen::VectorXd>(stage_names,
-                                     [&](const StageName& s) { return (stages.*s.stage).seconds; }),
-             "s", "wall time by stage, whole pour");
-  out.integers(
-      group + "/stages/calls",
-      column<IdVector>(stage_names, [&](const StageName& s) { return (stages.*s.stage).calls; }),
-      "passes by stage, whole pour");
+             column<Eigen::VectorXd>(stage_names, [&](const StageName& s) { return (stages.*s.stage).seconds; }), "s",
+             "wall time by stage, whole pour");
+  out.integers(group + "/stages/calls",
+               column<IdVector>(stage_names, [&](const StageName& s) { return (stages.*s.stage).calls; }),
+               "passes by stage, whole pour");
 }
 
 Timeline Timeline::read(const Hdf5Reader& in, const std::string& group) {
@@ -129,17 +124,14 @@ Timeline Timeline::read(const Hdf5Reader& in, const std::string& group) {
   const std::int64_t n = in.vector(group + "/time").size();
   timeline.rows.resize(static_cast<std::size_t>(n));
   const auto fill = [&](const auto& values, auto set) {
-    for (std::size_t r = 0; r < timeline.rows.size(); ++r)
-      set(timeline.rows[r], values[static_cast<Eigen::Index>(r)]);
+    for (std::size_t r = 0; r < timeline.rows.size(); ++r) set(timeline.rows[r], values[static_cast<Eigen::Index>(r)]);
   };
   for (const RealColumn& c : real_columns)
     fill(in.vector(group + "/" + c.name, n), [&](TimelineRow& r, double v) { r.*c.member = v; });
   for (const IntegerColumn& c : integer_columns)
-    fill(in.integers(group + "/" + c.name, n),
-         [&](TimelineRow& r, std::int64_t v) { r.*c.member = v; });
+    fill(in.integers(group + "/" + c.name, n), [&](TimelineRow& r, std::int64_t v) { r.*c.member = v; });
   for (std::size_t p = 0; p < place_names.size(); ++p) {
-    fill(in.vector(group + "/mass/" + place_names[p], n),
-         [&](TimelineRow& r, double v) { r.mass_at[p] = v; });
+    fill(in.vector(group + "/mass/" + place_names[p], n), [&](TimelineRow& r, double v) { r.mass_at[p] = v; });
     fill(in.integers(group + "/particles/" + place_names[p], n),
          [&](TimelineRow& r, std::int64_t v) { r.particles_at[p] = v; });
   }
@@ -147,13 +139,12 @@ Timeline Timeline::read(const Hdf5Reader& in, const std::string& group) {
   const Eigen::VectorXd seconds = in.vector(group + "/stages/seconds", count);
   const IdVector calls = in.integers(group + "/stages/calls", count);
   for (std::size_t s = 0; s < stage_names.size(); ++s)
-    timeline.stages.*stage_names[s].stage = {seconds[static_cast<Eigen::Index>(s)],
-                                             calls[static_cast<Eigen::Index>(s)]};
+    timeline.stages.*
+        stage_names[s].stage = {seconds[static_cast<Eigen::Index>(s)], calls[static_cast<Eigen::Index>(s)]};
   return timeline;
 }
 
-void write_timeline(const std::filesystem::path& file, const Timeline& timeline,
-                    const std::string& scene_json,
+void write_timeline(const std::filesystem::path& file, const Timeline& timeline, const std::string& scene_json,
                     const std::map<std::string, std::string>& texts) {
   Hdf5Writer out(file);
   out.text("/scene", scene_json, "canonical JSON");

@@ -34,8 +34,8 @@ struct TimelineRow {
 };
 
 /// The row of one state. Throws BackendError where a density or a pressure is not finite.
-TimelineRow timeline_row(std::int64_t frame, const Scene& scene, const ParticleState& state,
-                         const Fields& fields, const AuditResult& audit);
+TimelineRow timeline_row(std::int64_t frame, const Scene& scene, const ParticleState& state, const Fields& fields,
+                         const AuditResult& audit);
 
 /// Wall times of one stage of the substep, added over sessions.
 StageTimes operator+(const StageTimes& a, const StageTimes& b);
@@ -43,7 +43,7 @@ StageTimes operator+(const StageTimes& a, const StageTimes& b);
 /// Stage names and members, in the order they run.
 struct StageName {
   const char* name;
-  StageTimes::Stage StageTimes::*stage;
+  StageTimes::Stage StageTimes::* stage;
 };
 inline constexpr std::array<StageName, 4> stage_names = {{{"build", &StageTimes::build},
                                                           {"density", &StageTimes::density},
@@ -63,24 +63,24 @@ struct Timeline {
 
 /// timeline.h5: all columns and the scene, written whole. Throws std::runtime_error naming the
 /// file. \param texts  attributes of the root
-void write_timeline(const std::filesystem::path& file, const Timeline& timeline,
-                    const std::string& scene_json, const std::map<std::string, std::string>& texts);
+void write_timeline(const std::filesystem::path& file, const Timeline& timeline, const std::string& scene_json,
+                    const std::map<std::string, std::string>& texts);
 
 /// What the rows say in the end.
 struct PourSummary {
   std::int64_t particles = 0, frames = 0, substeps = 0;
-  std::array<double, place_names.size()> mass_at{};      // kg, at the end
-  std::array<double, place_names.size()> fraction_at{};  // of the whole mass
-  double mass = 0;                                       // kg
-  std::int64_t unbalanced_frames = 0;  // frames whose places do not add up to all particles
-  std::int64_t frames_inside = 0;      // frames with particles inside a solid
-  std::int64_t crossings = 0;          // particles seen crossing a wall, over all frames
-  double deepest = 0;                  // m
+  std::array<double, place_names.size()> mass_at{};                // kg, at the end
+  std::array<double, place_names.size()> fraction_at{};            // of the whole mass
+  double mass = 0;                                                 // kg
+  std::int64_t unbalanced_frames = 0;                              // frames whose places do not add up to all particles
+  std::int64_t frames_inside = 0;                                  // frames with particles inside a solid
+  std::int64_t crossings = 0;                                      // particles seen crossing a wall, over all frames
+  double deepest = 0;                                              // m
   std::int64_t penetration_frame = -1, penetration_particle = -1;  // the first one; −1: none
   double final_kinetic_energy = 0, peak_kinetic_energy = 0, peak_kinetic_time = 0;  // J, J, s
-  double max_speed = 0, max_density = 0;        // m/s, kg/m³; over all frames
-  double solver_seconds = 0, wall_seconds = 0;  // s
-  double seconds_per_substep = 0;               // s, of the solver alone
+  double max_speed = 0, max_density = 0;                                            // m/s, kg/m³; over all frames
+  double solver_seconds = 0, wall_seconds = 0;                                      // s
+  double seconds_per_substep = 0;                                                   // s, of the solver alone
 
   bool balanced() const { return unbalanced_frames == 0; }
   bool penetrated() const { return penetration_frame >= 0; }

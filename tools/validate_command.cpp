@@ -51,8 +51,7 @@ std::vector<const ValidationCase*> chosen_cases(const std::vector<std::string>& 
   std::string known;
   for (const auto& which : validation_cases()) {
     known += (known.empty() ? "" : ", ") + which.name;
-    if (names.empty() || std::find(names.begin(), names.end(), which.name) != names.end())
-      chosen.push_back(&which);
+    if (names.empty() || std::find(names.begin(), names.end(), which.name) != names.end()) chosen.push_back(&which);
   }
   for (const auto& name : names)
     if (std::none_of(chosen.begin(), chosen.end(), [&](const auto* c) { return c->name == name; }))
@@ -65,19 +64,16 @@ std::vector<int> resolutions_of(const ValidationCase& which, const ValidateArgum
   if (!arguments.resolutions.empty()) return arguments.resolutions;
   if (arguments.quick) return which.quick > 0 ? std::vector<int>{which.quick} : std::vector<int>{};
   std::vector<int> affordable = which.resolutions;
-  if (executor != "cuda")
-    std::erase_if(affordable, [&](int n) { return n > which.affordable; });
+  if (executor != "cuda") std::erase_if(affordable, [&](int n) { return n > which.affordable; });
   return affordable;
 }
 
 void print_list() {
   for (const auto& which : validation_cases()) {
     std::string resolutions;
-    for (const int n : which.resolutions)
-      resolutions += (resolutions.empty() ? "" : ", ") + std::to_string(n);
-    fmt::print("{:<13} {}\n{:<13} {}; {} particles along {:g} m{}\n", which.name, which.title, "",
-               which.source, resolutions, which.length,
-               which.quick ? fmt::format("; {} with --quick", which.quick) : "");
+    for (const int n : which.resolutions) resolutions += (resolutions.empty() ? "" : ", ") + std::to_string(n);
+    fmt::print("{:<13} {}\n{:<13} {}; {} particles along {:g} m{}\n", which.name, which.title, "", which.source,
+               resolutions, which.length, which.quick ? fmt::format("; {} with --quick", which.quick) : "");
   }
 }
 
@@ -86,21 +82,18 @@ void run(ValidateArguments& arguments, int& exit_status) {
   if (arguments.quick && !arguments.resolutions.empty())
     throw InputError("command line", "--quick", "given", "without --resolution");
   for (const int n : arguments.resolutions)
-    if (n < 4 || n > 1000)
-      throw InputError("command line", "--resolution", std::to_string(n), "4 to 1000");
+    if (n < 4 || n > 1000) throw InputError("command line", "--resolution", std::to_string(n), "4 to 1000");
   check_output_place("--report", arguments.report);
   const auto chosen = chosen_cases(arguments.cases);
   const auto fixtures = fixture_folder();
-  const auto backend =
-      choose_backend(arguments.flags.applied_to(arguments.backend), arguments.executor);
+  const auto backend = choose_backend(arguments.flags.applied_to(arguments.backend), arguments.executor);
   arguments.flags.require_used();
   std::vector<std::pair<const ValidationCase*, int>> runs;
   for (const ValidationCase* which : chosen)
     for (const int resolution : resolutions_of(*which, arguments, backend->info().executor))
       runs.emplace_back(which, resolution);
   if (runs.empty())
-    throw InputError("command line", "CASE", "none",
-                     "a case that this executor affords unasked; name a --resolution");
+    throw InputError("command line", "CASE", "none", "a case that this executor affords unasked; name a --resolution");
   std::vector<ValidationResult> results;
   std::int64_t done = 0;
   int broken = 0, gates = 0, met = 0;
@@ -111,8 +104,7 @@ void run(ValidateArguments& arguments, int& exit_status) {
         gates += quantity.gated();
         met += quantity.gated() && quantity.met();
       }
-    fmt::print("\n{} of {} gates met{}\n", met, gates,
-               broken ? fmt::format("; {} broke down", broken) : "");
+    fmt::print("\n{} of {} gates met{}\n", met, gates, broken ? fmt::format("; {} broke down", broken) : "");
     if (!interrupted.empty()) fmt::print("{}\n", interrupted);
     std::fflush(stdout);
     if (!arguments.report.empty()) write_validation(arguments.report, results, interrupted);
@@ -125,8 +117,7 @@ void run(ValidateArguments& arguments, int& exit_status) {
     const ValidationCase& which = *one.first;
     const int resolution = one.second;
     const Scene scene = scene_of(which, resolution, fixtures / "scenes");
-    Progress progress(fmt::format("{}/{} frame", which.name, resolution), scene.schedule.frames, 0,
-                      arguments.quiet);
+    Progress progress(fmt::format("{}/{} frame", which.name, resolution), scene.schedule.frames, 0, arguments.quiet);
     try {
       ValidationResult result;
       work.part([&] {
@@ -150,12 +141,11 @@ void run(ValidateArguments& arguments, int& exit_status) {
 
 void add_validate_command(CLI::App& app, int& exit_status) {
   auto arguments = std::make_shared<ValidateArguments>();
-  CLI::App& verb = *app.add_subcommand(
-      "validate", "runs cases whose answer is known, analytic or measured, and judges the solver");
+  CLI::App& verb =
+      *app.add_subcommand("validate", "runs cases whose answer is known, analytic or measured, and judges the solver");
   verb.add_option("CASE", arguments->cases, "cases to run; all where none is named");
   verb.add_flag("--list", arguments->list, "prints the cases and ends");
-  verb.add_option("--backend", arguments->backend, "solver: reference, or NAME[:OPTIONS]")
-      ->capture_default_str();
+  verb.add_option("--backend", arguments->backend, "solver: reference, or NAME[:OPTIONS]")->capture_default_str();
   verb.add_option("--executor", arguments->executor, "cuda, host, or auto: the GPU where there is one")
       ->capture_default_str();
   verb.add_option("--resolution", arguments->resolutions,

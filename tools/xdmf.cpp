@@ -23,62 +23,52 @@ struct Numbers {
 constexpr Numbers float32{"Float", 4}, uint8{"UChar", 1}, int32{"Int", 4};
 
 std::string whole(const std::string& dataset, const std::string& shape, Numbers numbers) {
-  return fmt::format(
-      "<DataItem Dimensions=\"{}\" NumberType=\"{}\" Precision=\"{}\" Format=\"HDF\">{}</DataItem>",
-      shape, numbers.type, numbers.precision, dataset);
+  return fmt::format("<DataItem Dimensions=\"{}\" NumberType=\"{}\" Precision=\"{}\" Format=\"HDF\">{}</DataItem>",
+                     shape, numbers.type, numbers.precision, dataset);
 }
 
 /// One frame of a [frames, rows(, columns)] dataset. ParaView's reader keeps a geometry for as long
 /// as the first thing inside its DataItem stays the same, so the comment that says which frame it
 /// is must come first.
-std::string slab(const std::string& dataset, std::size_t frame, std::int64_t frames,
-                 std::int64_t rows, int columns, Numbers numbers) {
+std::string slab(const std::string& dataset, std::size_t frame, std::int64_t frames, std::int64_t rows, int columns,
+                 Numbers numbers) {
   const bool flat = columns == 1;
   const std::string shape = flat ? fmt::format("{}", rows) : fmt::format("{} {}", rows, columns);
-  const std::string selection = flat ? fmt::format("{} 0 1 1 1 {}", frame, rows)
-                                     : fmt::format("{} 0 0 1 1 1 1 {} {}", frame, rows, columns);
+  const std::string selection =
+      flat ? fmt::format("{} 0 1 1 1 {}", frame, rows) : fmt::format("{} 0 0 1 1 1 1 {} {}", frame, rows, columns);
   return fmt::format(
       "<DataItem ItemType=\"HyperSlab\" Dimensions=\"{}\"><!-- frame {} -->"
       "<DataItem Dimensions=\"3 {}\" Format=\"XML\">{}</DataItem>{}</DataItem>",
-      shape, frame, flat ? 2 : 3, selection,
-      whole(dataset, fmt::format("{} {}", frames, shape), numbers));
+      shape, frame, flat ? 2 : 3, selection, whole(dataset, fmt::format("{} {}", frames, shape), numbers));
 }
 
 std::string temporal(std::string_view name) {
-  return fmt::format("<Grid Name=\"{}\" GridType=\"Collection\" CollectionType=\"Temporal\">\n",
-                     name);
+  return fmt::format("<Grid Name=\"{}\" GridType=\"Collection\" CollectionType=\"Temporal\">\n", name);
 }
 
 std::string attribute(std::string_view name, std::string_view type, const std::string& item) {
-  return fmt::format("<Attribute Name=\"{}\" AttributeType=\"{}\" Center=\"Node\">{}</Attribute>\n",
-                     name, type, item);
+  return fmt::format("<Attribute Name=\"{}\" AttributeType=\"{}\" Center=\"Node\">{}</Attribute>\n", name, type, item);
 }
 
 std::string escaped(std::string_view text) {
   std::string out;
   for (const char c : text) {
-    if (c == '&')
-      out += "&amp;";
-    else if (c == '<')
-      out += "&lt;";
-    else if (c == '"')
-      out += "&quot;";
-    else
-      out += c;
+    if (c == '&') out += "&amp;";
+    else if (c == '<') out += "&lt;";
+    else if (c == '"') out += "&quot;";
+    else out += c;
   }
   return out;
 }
 
 }  // namespace
 
-std::string frames_xdmf(const FrameLayout& layout, const std::vector<double>& times,
-                        const std::string& data_file) {
+std::string frames_xdmf(const FrameLayout& layout, const std::vector<double>& times, const std::string& data_file) {
   const std::int64_t n = layout.particles;
   std::string out = std::string(head) + temporal("fluid");
   for (std::size_t t = 0; t < times.size(); ++t) {
     const auto item = [&](std::string_view name, int columns, Numbers numbers) {
-      return slab(fmt::format("{}:/fluid/{}", data_file, name), t, layout.frames, n, columns,
-                  numbers);
+      return slab(fmt::format("{}:/fluid/{}", data_file, name), t, layout.frames, n, columns, numbers);
     };
     out += fmt::format(
         "<Grid Name=\"fluid\" GridType=\"Uniform\"><Time Value=\"{}\"/>\n"
@@ -94,8 +84,7 @@ std::string frames_xdmf(const FrameLayout& layout, const std::vector<double>& ti
   return out + std::string(tail);
 }
 
-std::string walls_xdmf(const FrameLayout& layout, const std::vector<double>& times,
-                       const std::string& data_file) {
+std::string walls_xdmf(const FrameLayout& layout, const std::vector<double>& times, const std::string& data_file) {
   std::string out = std::string(head) + temporal("walls");
   for (std::size_t t = 0; t < times.size(); ++t) {
     out += fmt::format(

@@ -36,9 +36,7 @@ FAULT_BOTH float rounded_to(int bits, float x) {
 }
 
 /// Mutations: the value, or another one when the fault is on.
-FAULT_BOTH float altered(int number, float value, float instead) {
-  return fault(number) ? instead : value;
-}
+FAULT_BOTH float altered(int number, float value, float instead) { return fault(number) ? instead : value; }
 
 /// a + Turn{k} * b is a − b when fault k is on.
 struct Turn {
@@ -47,10 +45,8 @@ struct Turn {
 template <class T>
 FAULT_BOTH T operator*(Turn turn, T b) {
   if (!fault(turn.number)) return b;
-  if constexpr (requires { b.x; })
-    return T{-b.x, -b.y, -b.z};
-  else
-    return static_cast<T>(-b);
+  if constexpr (requires { b.x; }) return T{-b.x, -b.y, -b.z};
+  else return static_cast<T>(-b);
 }
 
 /// a * Gain{k} * b has a larger by a percent, an integer by one.
@@ -60,10 +56,8 @@ struct Gain {
 template <class T>
 FAULT_BOTH T operator*(T a, Gain gain) {
   if (!fault(gain.number)) return a;
-  if constexpr (static_cast<T>(0.5f) != T(0))
-    return static_cast<T>(1.01f) * a;
-  else
-    return a + 1;
+  if constexpr (static_cast<T>(0.5f) != T(0)) return static_cast<T>(1.01f) * a;
+  else return a + 1;
 }
 
 /// a < Beyond{k} + b is a <= b.
@@ -75,8 +69,7 @@ FAULT_BOTH T operator+(Beyond beyond, T b) {
   if (!fault(beyond.number)) return b;
   if constexpr (static_cast<T>(0.5f) != T(0))
     return b + (b < 0 ? -b : b) * static_cast<T>(sizeof(T) == 4 ? 1.2e-7 : 2.3e-16);
-  else
-    return b + 1;
+  else return b + 1;
 }
 
 }  // namespace decant::gpu

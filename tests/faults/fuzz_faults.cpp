@@ -23,12 +23,11 @@ std::string campaign_text(const std::vector<std::string>& backends, Executor exe
   settings.first_seed = first_seed;
   settings.cases = most_cases;
   settings.most_findings = 1;
-  const fuzz::Campaign c = fuzz::run_campaign(
-      settings, [&](const std::string& choice) { return backend_of(choice, executor); });
+  const fuzz::Campaign c =
+      fuzz::run_campaign(settings, [&](const std::string& choice) { return backend_of(choice, executor); });
   if (c.findings.empty()) return fmt::format("{} 0 0 0 -", c.cases);
   const fuzz::Finding& f = c.findings.front();
-  return fmt::format("{} {} {} {} {}", c.cases, f.found_particles, f.genome.points.size(), f.tries,
-                     f.outcome.property);
+  return fmt::format("{} {} {} {} {}", c.cases, f.found_particles, f.genome.points.size(), f.tries, f.outcome.property);
 }
 
 /// The backend that a fault is planted for; all of them, and the options that it needs, where nobody knew.
@@ -41,8 +40,8 @@ std::vector<std::string> backends_of(const nlohmann::json& fault) {
 
 }  // namespace
 
-std::string fuzz_faults(const nlohmann::json& faults, Executor executor, int jobs,
-                        std::int64_t most_cases, std::uint64_t first_seed, bool& all_found) {
+std::string fuzz_faults(const nlohmann::json& faults, Executor executor, int jobs, std::int64_t most_cases,
+                        std::uint64_t first_seed, bool& all_found) {
   std::vector<nlohmann::json> planted;
   for (const auto& f : faults)
     if ((f["on"] != "cuda" || executor == Executor::cuda) && f.value("equivalent", std::string()).empty())
@@ -52,33 +51,31 @@ std::string fuzz_faults(const nlohmann::json& faults, Executor executor, int job
     choose_fault(executor, planted[k]["number"].get<int>());
     return campaign_text(backends_of(planted[k]), executor, most_cases, first_seed);
   });
-  std::string table = fmt::format("{:<26} {:<22} {:>8} {:>10} {:>8} {:>6}  {}\n", "fault", "backend",
-                                  "problems", "particles", "shrunk", "tries",
-                                  "property; what is wrong");
+  std::string table = fmt::format("{:<26} {:<22} {:>8} {:>10} {:>8} {:>6}  {}\n", "fault", "backend", "problems",
+                                  "particles", "shrunk", "tries", "property; what is wrong");
   std::size_t count = 0;
   std::vector<long> cases;
   for (std::size_t k = 0; k < planted.size(); ++k) {
     char property[64] = "-";
     long tried = 0, particles = 0, shrunk = 0, tries = 0;
-    const bool told = std::sscanf(found[k].text.c_str(), "%ld %ld %ld %ld %63s", &tried, &particles,
-                                  &shrunk, &tries, property) == 5;
-    const bool hit =
-        told ? property[0] != '-' : found[k].ended == "crash" || found[k].ended == "hang";
+    const bool told =
+        std::sscanf(found[k].text.c_str(), "%ld %ld %ld %ld %63s", &tried, &particles, &shrunk, &tries, property) == 5;
+    const bool hit = told ? property[0] != '-' : found[k].ended == "crash" || found[k].ended == "hang";
     count += hit;
     if (hit && told) cases.push_back(tried);
-    table += fmt::format("{:<26} {:<22} {:>8} {:>10} {:>8} {:>6}  {}; {}\n",
-                         planted[k]["name"].get<std::string>(),
-                         planted[k].value("backend", "all"), told ? tried : 0,
-                         told && hit ? std::to_string(particles) : "-",
-                         told && hit ? std::to_string(shrunk) : "-", tries,
-                         !hit ? "NOT FOUND" : told ? property : found[k].ended,
-                         planted[k]["what"].get<std::string>());
+    table +=
+        fmt::format("{:<26} {:<22} {:>8} {:>10} {:>8} {:>6}  {}; {}\n", planted[k]["name"].get<std::string>(),
+                    planted[k].value("backend", "all"), told ? tried : 0, told && hit ? std::to_string(particles) : "-",
+                    told && hit ? std::to_string(shrunk) : "-", tries,
+                    !hit   ? "NOT FOUND"
+                    : told ? property
+                           : found[k].ended,
+                    planted[k]["what"].get<std::string>());
   }
   std::sort(cases.begin(), cases.end());
-  table += fmt::format("{} of {} found within {} problems of seeds from {}", count, planted.size(),
-                       most_cases, first_seed);
-  if (!cases.empty())
-    table += fmt::format("; median {}, most {}", cases[cases.size() / 2], cases.back());
+  table +=
+      fmt::format("{} of {} found within {} problems of seeds from {}", count, planted.size(), most_cases, first_seed);
+  if (!cases.empty()) table += fmt::format("; median {}, most {}", cases[cases.size() / 2], cases.back());
   all_found = count == planted.size();
   return table + "\n";
 }

@@ -40,16 +40,14 @@ std::vector<Recording> small_fixtures(const std::filesystem::path& folder) {
 }  // namespace
 
 std::string judge_held_out(const nlohmann::json& faults, Executor executor, int jobs,
-                           const std::filesystem::path& folder,
-                           const std::vector<std::string>& only, bool& all_caught) {
+                           const std::filesystem::path& folder, const std::vector<std::string>& only,
+                           bool& all_caught) {
   std::vector<nlohmann::json> planted;
   std::size_t not_run = 0;
   for (const auto& f : faults) {
     if (!only.empty() && std::count(only.begin(), only.end(), text(f, "name")) == 0) continue;
-    if (text(f, "on") == "cuda" && executor != Executor::cuda)
-      ++not_run;
-    else
-      planted.push_back(f);
+    if (text(f, "on") == "cuda" && executor != Executor::cuda) ++not_run;
+    else planted.push_back(f);
   }
   const std::vector<Recording> fixtures = small_fixtures(folder);
   std::vector<Trial> all;
@@ -97,16 +95,16 @@ std::string judge_held_out(const nlohmann::json& faults, Executor executor, int 
       defaults += static_cast<std::size_t>(by_default[k]);
       wrong += by[k].empty();
     }
-    table += fmt::format("{:<38} {}\n{:<38} {}\n", text(planted[k], "name"), text(planted[k], "what"), "",
-                         verdict);
+    table += fmt::format("{:<38} {}\n{:<38} {}\n", text(planted[k], "name"), text(planted[k], "what"), "", verdict);
   }
   const std::string alarms = failures_without_fault(all, executor, jobs, prepared);
   all_caught = wrong == 0 && alarms.empty();
   return table + alarms +
-         fmt::format("{} of {} caught by conform, {} of them at the backends' defaults; {} equivalent with a "
-                     "reason; {} not_run here; without a fault {}\n",
-                     caught, planted.size() - equivalent, defaults, equivalent, not_run,
-                     alarms.empty() ? "all pass" : "SOME FAIL");
+         fmt::format(
+             "{} of {} caught by conform, {} of them at the backends' defaults; {} equivalent with a "
+             "reason; {} not_run here; without a fault {}\n",
+             caught, planted.size() - equivalent, defaults, equivalent, not_run,
+             alarms.empty() ? "all pass" : "SOME FAIL");
 }
 
 }  // namespace decant

@@ -18,7 +18,6 @@ namespace decant {
 /// something fails. A fault marked `equivalent` must not be caught. Returns a table and a count.
 /// \param only  names; empty: all
 std::string judge_held_out(const nlohmann::json& faults, Executor executor, int jobs,
-                           const std::filesystem::path& folder,
-                           const std::vector<std::string>& only, bool& all_caught);
+                           const std::filesystem::path& folder, const std::vector<std::string>& only, bool& all_caught);
 
 }  // namespace decant

@@ -7,10 +7,10 @@
 #include "tests/faults/held_out.hpp"
 #include "tests/faults/trials.hpp"
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 #include <omp.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <fstream>
@@ -52,8 +52,8 @@ int run_catalogue(const Settings& s, const nlohmann::json& faults, Executor exec
   }
   const auto prepared = prepare_all(trials, s.folder);
   const auto outcomes = run_all(trials, executor, s.jobs, prepared);
-  std::string table = fmt::format("{:<26} {:<17} {:<16} {:>9}  {}\n", "fault", "backend", "check",
-                                  "factor", "what is wrong; what fails besides");
+  std::string table = fmt::format("{:<26} {:<17} {:<16} {:>9}  {}\n", "fault", "backend", "check", "factor",
+                                  "what is wrong; what fails besides");
   std::size_t caught = 0, near = 0, equivalent = 0, reasons = 0;
   for (std::size_t t = 0; t < trials.size(); ++t) {
     const Outcome& o = outcomes[t];
@@ -62,9 +62,8 @@ int run_catalogue(const Settings& s, const nlohmann::json& faults, Executor exec
     if (const std::string reason = why_equivalent(planted[t]); !reason.empty()) {
       ++reasons;
       equivalent += !o.caught;
-      table += fmt::format("{:<26} {:<17} {:<16} {:>9}  {}; {}\n", text(planted[t], "name"),
-                           trials[t].backend, "", o.caught ? "SHOWS" : "same",
-                           text(planted[t], "what"), reason);
+      table += fmt::format("{:<26} {:<17} {:<16} {:>9}  {}; {}\n", text(planted[t], "name"), trials[t].backend, "",
+                           o.caught ? "SHOWS" : "same", text(planted[t], "what"), reason);
       continue;
     }
     caught += hit != o.failed.end();
@@ -73,24 +72,22 @@ int run_catalogue(const Settings& s, const nlohmann::json& faults, Executor exec
                                : !(hit->second < 1e6) ? "no bound"
                                                       : fmt::format("{:.3g}", hit->second);
     const std::string others = joined(o.failed, check);
-    table += fmt::format("{:<26} {:<17} {:<16} {:>9}  {}; {}\n", text(planted[t], "name"),
-                         trials[t].backend, check, factor, text(planted[t], "what"),
+    table += fmt::format("{:<26} {:<17} {:<16} {:>9}  {}; {}\n", text(planted[t], "name"), trials[t].backend, check,
+                         factor, text(planted[t], "what"),
                          !o.ended.empty() ? o.ended
                          : others.empty() ? "nothing"
                                           : others);
   }
   for (const auto& f : faults)
     if (s.only.empty() && f["on"] == "cuda" && executor != Executor::cuda)
-      table += fmt::format("{:<26} {:<17} {:<16} {:>9}  {}\n", text(f, "name"), text(f, "backend"),
-                           text(f, "check"), "not_run", text(f, "what"));
+      table += fmt::format("{:<26} {:<17} {:<16} {:>9}  {}\n", text(f, "name"), text(f, "backend"), text(f, "check"),
+                           "not_run", text(f, "what"));
   const std::string wrong = failures_without_fault(clean(trials), executor, s.jobs, prepared);
   const std::size_t faulty = trials.size() - reasons;
-  table +=
-      wrong + fmt::format(
-                  "{} of {} caught by the check that is there for it, {} by a factor below 10; "
-                  "{} of {} that change nothing show nothing; {} not_run here; without a fault {}\n",
-                  caught, faulty, near, equivalent, reasons, not_run,
-                  wrong.empty() ? "all pass" : "SOME FAIL");
+  table += wrong + fmt::format(
+                       "{} of {} caught by the check that is there for it, {} by a factor below 10; "
+                       "{} of {} that change nothing show nothing; {} not_run here; without a fault {}\n",
+                       caught, faulty, near, equivalent, reasons, not_run, wrong.empty() ? "all pass" : "SOME FAIL");
   return finish(s, table, caught == faulty && equivalent == reasons && wrong.empty());
 }
 
@@ -140,8 +137,7 @@ int run_mutations(const Settings& s, const nlohmann::json& faults, Executor exec
     std::vector<std::size_t> which;
     for (std::size_t k = 0; k < faults.size(); ++k) {
       if (!by[k].empty()) continue;
-      if ((faults[k]["file"] == "brute_force.cuh") != (backend == "brute") &&
-          faults[k]["file"] == "brute_force.cuh")
+      if ((faults[k]["file"] == "brute_force.cuh") != (backend == "brute") && faults[k]["file"] == "brute_force.cuh")
         continue;
       trials.push_back({number(faults[k]), backend, fixture, checks});
       which.push_back(k);
@@ -153,9 +149,8 @@ int run_mutations(const Settings& s, const nlohmann::json& faults, Executor exec
     }
     for (std::size_t t = 0; t < trials.size(); ++t)
       if (outcomes[t].caught)
-        by[which[t]] = fmt::format(
-            "{}, {}: {}", backend, fixture,
-            outcomes[t].ended.empty() ? joined(outcomes[t].failed, "") : outcomes[t].ended);
+        by[which[t]] = fmt::format("{}, {}: {}", backend, fixture,
+                                   outcomes[t].ended.empty() ? joined(outcomes[t].failed, "") : outcomes[t].ended);
   }
   std::size_t caught = 0, explained = 0;
   std::string table;
@@ -170,16 +165,14 @@ int run_mutations(const Settings& s, const nlohmann::json& faults, Executor exec
     } else {
       verdict = "SURVIVES";
     }
-    table +=
-        fmt::format("{:<24} {}: {}\n{:<24} {}\n", text(faults[k], "name"), what, line, "", verdict);
+    table += fmt::format("{:<24} {}: {}\n{:<24} {}\n", text(faults[k], "name"), what, line, "", verdict);
   }
   const std::string wrong = failures_without_fault(used, executor, s.jobs, prepared);
-  table +=
-      wrong + fmt::format(
-                  "{} mutations: {} caught, {} equivalent with a reason, {} survive; without a "
-                  "mutation {}\n",
-                  faults.size(), caught, explained, faults.size() - caught - explained,
-                  wrong.empty() ? "all pass" : "SOME FAIL");
+  table += wrong + fmt::format(
+                       "{} mutations: {} caught, {} equivalent with a reason, {} survive; without a "
+                       "mutation {}\n",
+                       faults.size(), caught, explained, faults.size() - caught - explained,
+                       wrong.empty() ? "all pass" : "SOME FAIL");
   return finish(s, table, caught + explained == faults.size() && wrong.empty());
 }
 
@@ -191,14 +184,12 @@ int run(const Settings& s) {
   omp_set_num_threads(1);
   if (s.fuzz > 0) {
     bool all_found = false;
-    const std::string table =
-        fuzz_faults(faults, executor, s.jobs, s.fuzz, s.first_seed, all_found);
+    const std::string table = fuzz_faults(faults, executor, s.jobs, s.fuzz, s.first_seed, all_found);
     return finish(s, table, all_found);
   }
   if (!faults.empty() && faults[0].contains("shows")) {
     bool all_caught = false;
-    const std::string table =
-        judge_held_out(faults, executor, s.jobs, s.folder, s.only, all_caught);
+    const std::string table = judge_held_out(faults, executor, s.jobs, s.folder, s.only, all_caught);
     return finish(s, table, all_caught);
   }
   const bool mutations = !faults.empty() && !faults[0].contains("check");

@@ -61,13 +61,9 @@ Outcome outcome_of(const Said& said) {
 
 }  // namespace
 
-std::string text(const nlohmann::json& fault, const char* key) {
-  return fault.at(key).get<std::string>();
-}
+std::string text(const nlohmann::json& fault, const char* key) { return fault.at(key).get<std::string>(); }
 int number(const nlohmann::json& fault) { return fault.at("number").get<int>(); }
-std::string why_equivalent(const nlohmann::json& fault) {
-  return fault.value("equivalent", std::string());
-}
+std::string why_equivalent(const nlohmann::json& fault) { return fault.value("equivalent", std::string()); }
 
 std::vector<Outcome> run_all(const std::vector<Trial>& trials, Executor executor, int jobs,
                              const std::map<std::string, Prepared>& prepared) {
@@ -85,10 +81,8 @@ std::string failures_without_fault(const std::vector<Trial>& trials, Executor ex
   const auto outcomes = run_all(trials, executor, jobs, prepared);
   for (std::size_t t = 0; t < trials.size(); ++t)
     if (outcomes[t].caught)
-      text += fmt::format("without a fault: {} fails on {} ({})\n", trials[t].backend,
-                          trials[t].fixture,
-                          outcomes[t].failed.empty() ? outcomes[t].ended
-                                                     : outcomes[t].failed.begin()->first);
+      text += fmt::format("without a fault: {} fails on {} ({})\n", trials[t].backend, trials[t].fixture,
+                          outcomes[t].failed.empty() ? outcomes[t].ended : outcomes[t].failed.begin()->first);
   return text;
 }
 
@@ -100,8 +94,7 @@ std::vector<Trial> clean(const std::vector<Trial>& trials) {
   return all;
 }
 
-std::map<std::string, Prepared> prepare_all(const std::vector<Trial>& trials,
-                                            const std::filesystem::path& folder) {
+std::map<std::string, Prepared> prepare_all(const std::vector<Trial>& trials, const std::filesystem::path& folder) {
   std::map<std::string, Prepared> prepared;
   for (const Trial& t : trials) {
     if (prepared.count(t.fixture)) continue;

@@ -44,8 +44,7 @@ int number(const nlohmann::json& fault);
 std::string why_equivalent(const nlohmann::json& fault);
 
 /// Every fixture of the trials, read from `folder` and prepared for all checks.
-std::map<std::string, Prepared> prepare_all(const std::vector<Trial>& trials,
-                                            const std::filesystem::path& folder);
+std::map<std::string, Prepared> prepare_all(const std::vector<Trial>& trials, const std::filesystem::path& folder);
 
 /// One outcome per trial, `jobs` processes at a time.
 std::vector<Outcome> run_all(const std::vector<Trial>& trials, Executor executor, int jobs,

@@ -59,16 +59,19 @@ class Edit {
 
   void of(const Object& object) {
     switch (pick(object.is_dataset ? 6 : 2)) {
-      case 0: return change_attribute(object.path);
-      case 1: return unlink(object.path);
-      case 2: return replace(object.path);
-      case 3: return link_elsewhere(object.path);
-      default: return set_value(object.path);
+      case 0:
+        return change_attribute(object.path);
+      case 1:
+        return unlink(object.path);
+      case 2:
+        return replace(object.path);
+      case 3:
+        return link_elsewhere(object.path);
+      default:
+        return set_value(object.path);
     }
   }
-  std::size_t pick(std::size_t count) {
-    return std::uniform_int_distribution<std::size_t>(0, count - 1)(random_);
-  }
+  std::size_t pick(std::size_t count) { return std::uniform_int_distribution<std::size_t>(0, count - 1)(random_); }
 
  private:
   hid_t type() {
@@ -114,28 +117,25 @@ class Edit {
       const std::array<hsize_t, 3> chunk = {64, 3, 1};
       H5Pset_chunk(layout.get(), rank, chunk.data());
     }
-    const Handle made(H5Dcreate2(file_, path.c_str(), its_type.get(), its_space.get(), H5P_DEFAULT,
-                                 layout.get(), H5P_DEFAULT));
+    const Handle made(
+        H5Dcreate2(file_, path.c_str(), its_type.get(), its_space.get(), H5P_DEFAULT, layout.get(), H5P_DEFAULT));
   }
 
   void link_elsewhere(const std::string& path) {
     unlink(path);
     const std::array targets = {"/", "/state", "/scene", "/state/position", "/nowhere"};
     const std::size_t k = pick(targets.size() + 3);
-    if (k < targets.size())
-      H5Lcreate_soft(targets[k], file_, path.c_str(), H5P_DEFAULT, H5P_DEFAULT);
-    else if (k == targets.size())
-      H5Lcreate_soft(path.c_str(), file_, path.c_str(), H5P_DEFAULT, H5P_DEFAULT);
+    if (k < targets.size()) H5Lcreate_soft(targets[k], file_, path.c_str(), H5P_DEFAULT, H5P_DEFAULT);
+    else if (k == targets.size()) H5Lcreate_soft(path.c_str(), file_, path.c_str(), H5P_DEFAULT, H5P_DEFAULT);
     else if (k == targets.size() + 1)
       H5Lcreate_external("elsewhere.h5", "/scene", file_, path.c_str(), H5P_DEFAULT, H5P_DEFAULT);
-    else
-      H5Lcreate_hard(file_, "/state", file_, path.c_str(), H5P_DEFAULT, H5P_DEFAULT);
+    else H5Lcreate_hard(file_, "/state", file_, path.c_str(), H5P_DEFAULT, H5P_DEFAULT);
   }
 
   double strange_number() {
     using Limits = std::numeric_limits<double>;
-    const std::array some = {Limits::quiet_NaN(), Limits::infinity(), -1.0, 0.0, 1e300,
-                             Limits::denorm_min(), 0.1, -9.3e18, 1.0};
+    const std::array some = {
+        Limits::quiet_NaN(), Limits::infinity(), -1.0, 0.0, 1e300, Limits::denorm_min(), 0.1, -9.3e18, 1.0};
     return some[pick(some.size())];
   }
 
@@ -147,8 +147,7 @@ class Edit {
     const Handle its_type(H5Dget_type(data.get()));
     if (H5Tget_class(its_type.get()) == H5T_STRING) return;
     std::vector<double> values(static_cast<std::size_t>(count));
-    if (H5Dread(data.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0)
-      return;
+    if (H5Dread(data.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) return;
     values[pick(values.size())] = strange_number();
     H5Dwrite(data.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data());
   }
@@ -163,11 +162,10 @@ class Edit {
     bool large = false;
     const Handle its_space = space(large), its_type(type());
     if (large) return;
-    const Handle attribute(H5Acreate2(object.get(), name.c_str(), its_type.get(), its_space.get(),
-                                      H5P_DEFAULT, H5P_DEFAULT));
+    const Handle attribute(
+        H5Acreate2(object.get(), name.c_str(), its_type.get(), its_space.get(), H5P_DEFAULT, H5P_DEFAULT));
     const double value = strange_number();
-    if (H5Sget_simple_extent_npoints(its_space.get()) == 1)
-      H5Awrite(attribute.get(), H5T_NATIVE_DOUBLE, &value);
+    if (H5Sget_simple_extent_npoints(its_space.get()) == 1) H5Awrite(attribute.get(), H5T_NATIVE_DOUBLE, &value);
   }
 
   hid_t file_;
@@ -193,8 +191,7 @@ bool is_sealed(std::string_view bytes) {
 }  // namespace
 
 ScratchFile::ScratchFile(std::string_view bytes)
-    : path_(std::filesystem::temp_directory_path() /
-            ("decant-reader-" + std::to_string(getpid()) + ".h5")) {
+    : path_(std::filesystem::temp_directory_path() / ("decant-reader-" + std::to_string(getpid()) + ".h5")) {
   std::ofstream(path_, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
 }
 ScratchFile::~ScratchFile() {

@@ -19,10 +19,8 @@ constexpr char separator = '\t';
 std::vector<std::string> columns_of(const std::string& line) {
   std::vector<std::string> columns(1);
   for (const char c : line)
-    if (c == separator)
-      columns.emplace_back();
-    else
-      columns.back() += c;
+    if (c == separator) columns.emplace_back();
+    else columns.back() += c;
   return columns;
 }
 
@@ -42,8 +40,7 @@ struct Worst {
 
 }  // namespace
 
-std::string lines_of_forms(const std::vector<std::string>& fixtures, std::uint32_t k, std::uint32_t first,
-                           int tries) {
+std::string lines_of_forms(const std::vector<std::string>& fixtures, std::uint32_t k, std::uint32_t first, int tries) {
   const bool recorded = k < fixtures.size();
   const std::uint32_t seed = recorded ? k : first + k - static_cast<std::uint32_t>(fixtures.size());
   const Fixture fixture = recorded ? read_fixture(fixtures[k]) : test::random_form_case(seed);
@@ -59,15 +56,13 @@ std::string lines_of_forms(const std::vector<std::string>& fixtures, std::uint32
   for (int t = 0; t < tries; ++t) {
     const test::Forms forms = test::random_forms(random);
     std::string chosen;
-    for (const auto& [name, value] : test::choices(forms))
-      chosen += fmt::format("{}: {}{}", name, value, separator);
+    for (const auto& [name, value] : test::choices(forms)) chosen += fmt::format("{}: {}{}", name, value, separator);
     const auto put = [&](const Fields& got, const OracleAnswer& oracle, const char* stage) {
       for (const auto& [field, score] : test::scores(got, oracle)) {
         if (oracle.fields.density.size() == 0) continue;
         const bool once = field == "boundary_volume" || field == "density";
         if (once && stage[0] != '\0') continue;  // these two do not depend on what is given
-        lines += fmt::format("{}{}{}{}{}{}{}\n", fixture.name, separator, chosen, field, stage,
-                             separator, score);
+        lines += fmt::format("{}{}{}{}{}{}{}\n", fixture.name, separator, chosen, field, stage, separator, score);
       }
     };
     put(test::evaluate_by(forms, fixture.scene, walls, fixture.state), own, "");
@@ -96,21 +91,20 @@ FormsTable table_of_forms(const std::vector<std::string>& lines) {
     above += fmt::format("{}: {} scores {:.3g}\n", problem, field, score);
   }
   table.problems = static_cast<std::int64_t>(problems.size());
-  table.text = fmt::format("{:<42} {:>9} {:>8} {:>8} {:>8}  {}\n", "field, largest score of a set of forms",
-                           "sets", "median", "p99", "largest", "of");
+  table.text = fmt::format("{:<42} {:>9} {:>8} {:>8} {:>8}  {}\n", "field, largest score of a set of forms", "sets",
+                           "median", "p99", "largest", "of");
   for (auto& [field, worst] : by_field) {
     auto& scores = all[field];
     std::sort(scores.begin(), scores.end());
     const auto quantile = [&](double share) {
       return scores[static_cast<std::size_t>(share * static_cast<double>(scores.size() - 1))];
     };
-    table.text += fmt::format("{:<42} {:>9} {:>8.3f} {:>8.3f} {:>8.3f}  {}\n", field, worst.values,
-                              quantile(0.5), quantile(0.99), worst.score, worst.problem);
+    table.text += fmt::format("{:<42} {:>9} {:>8.3f} {:>8.3f} {:>8.3f}  {}\n", field, worst.values, quantile(0.5),
+                              quantile(0.99), worst.score, worst.problem);
   }
   table.text += fmt::format("\n{:<42} {:>9} {:>26}\n", "form", "rows", "largest");
   for (const auto& [choice, worst] : by_choice)
-    table.text += fmt::format("{:<42} {:>9} {:>26.3f}  {}\n", choice, worst.values, worst.score,
-                              worst.problem);
+    table.text += fmt::format("{:<42} {:>9} {:>26.3f}  {}\n", choice, worst.values, worst.score, worst.problem);
   table.text += "\n" + above + fmt::format("{} scores above 1\n", table.above);
   return table;
 }

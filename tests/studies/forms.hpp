@@ -11,8 +11,7 @@ namespace decant {
 /// Lines of one problem, "K" counting fixtures first and random cases after them: for every set of forms
 /// and every field "problem forms… field score".
 /// \param tries  sets of forms per problem
-std::string lines_of_forms(const std::vector<std::string>& fixtures, std::uint32_t k, std::uint32_t first,
-                           int tries);
+std::string lines_of_forms(const std::vector<std::string>& fixtures, std::uint32_t k, std::uint32_t first, int tries);
 
 /// The table of these lines, and how many scores are above 1.
 struct FormsTable {

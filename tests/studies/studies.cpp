@@ -15,10 +15,10 @@
 #include "tests/scene_coverage.hpp"
 #include "tests/studies/forms.hpp"
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <omp.h>
+#include <CLI/CLI.hpp>
 
 #include <sys/wait.h>
 #include <unistd.h>
@@ -103,18 +103,15 @@ std::string judged_case(const Settings& s, Executor executor, std::uint32_t seed
   const CheckSelection checks{"fields", "substep", "conservation"};
   Fixture fixture = test::random_fixture(seed);
   // A state that fp32 cannot judge at all is no case; `record` warns of those.
-  if (!evaluate_oracle(fixture.scene, fixture.state, fixture.fields.emplace(),
-                       fixture.condition.emplace())
-           .empty())
+  if (!evaluate_oracle(fixture.scene, fixture.state, fixture.fields.emplace(), fixture.condition.emplace()).empty())
     return {};
   const Judgement oracle = prepare(fixture, checks);
   std::string lines;
   for (const auto& name : s.backends)
     for (CheckRow& row : judge(*make_backend(name, executor), fixture, oracle, checks)) {
       condense(row);
-      lines += fmt::format("{} {} {} {} {} {} {} {}\n", row.check,
-                           row.field.empty() ? "-" : row.field, name, seed, row.n, row.score,
-                           row.median_score, to_string(judged_verdict(row)));
+      lines += fmt::format("{} {} {} {} {} {} {} {}\n", row.check, row.field.empty() ? "-" : row.field, name, seed,
+                           row.n, row.score, row.median_score, to_string(judged_verdict(row)));
     }
   return lines;
 }
@@ -125,9 +122,8 @@ int scores(const Settings& s) {
   std::int64_t alarms = 0;
   std::string false_alarms;
   std::set<std::uint32_t> judged;
-  for (const auto& line : spread(s.processes, s.cases, [&](std::uint32_t k) {
-         return judged_case(s, executor, s.first + k);
-       })) {
+  for (const auto& line :
+       spread(s.processes, s.cases, [&](std::uint32_t k) { return judged_case(s, executor, s.first + k); })) {
     std::istringstream columns(line);
     std::string check, field, name, score, median, verdict;
     std::uint32_t seed = 0;
@@ -152,15 +148,14 @@ int scores(const Settings& s) {
       "score = |error| / tolerance. Largest of a case: median, 99th percentile, largest of all and its\n"
       "seed; median of a case's values: median over the cases.\n\n"
       "{:<16} {:<27} {:<6} {:>11} {:>8} {:>8} {:>8} {:>8} {:>8}\n",
-      judged.size(), s.first, s.first + s.cases - 1, s.executor, executor_device(executor), "check", "field",
-      "", "values", "median", "p99", "largest", "seed", "typical");
+      judged.size(), s.first, s.first + s.cases - 1, s.executor, executor_device(executor), "check", "field", "",
+      "values", "median", "p99", "largest", "seed", "typical");
   for (auto& [key, spread] : all) {
     std::sort(spread.largest.begin(), spread.largest.end());
     std::sort(spread.median.begin(), spread.median.end());
-    text += fmt::format("{:<16} {:<27} {:<6} {:>11} {:>8.3f} {:>8.3f} {:>8.3f} {:>8} {:>8.4f}\n", key[0],
-                        key[1], key[2], spread.values, quantile(spread.largest, 0.5),
-                        quantile(spread.largest, 0.99), spread.worst, spread.worst_case,
-                        quantile(spread.median, 0.5));
+    text += fmt::format("{:<16} {:<27} {:<6} {:>11} {:>8.3f} {:>8.3f} {:>8.3f} {:>8} {:>8.4f}\n", key[0], key[1],
+                        key[2], spread.values, quantile(spread.largest, 0.5), quantile(spread.largest, 0.99),
+                        spread.worst, spread.worst_case, quantile(spread.median, 0.5));
   }
   text += "\n" + false_alarms + fmt::format("{} scores above 1\n", alarms);
   return finish(s, text, alarms == 0);
@@ -168,9 +163,8 @@ int scores(const Settings& s) {
 
 int forms(const Settings& s) {
   const auto count = static_cast<std::uint32_t>(s.fixtures.size()) + s.cases;
-  const FormsTable table = table_of_forms(spread(s.processes, count, [&](std::uint32_t k) {
-    return lines_of_forms(s.fixtures, k, s.first, s.tries);
-  }));
+  const FormsTable table = table_of_forms(
+      spread(s.processes, count, [&](std::uint32_t k) { return lines_of_forms(s.fixtures, k, s.first, s.tries); }));
   const std::string text = fmt::format(
       "Legal forms of every operation in fp32 on {} recordings and random cases of seeds {} to {},\n"
       "{} sets of forms each, drawn at random; score = |error| / tolerance; {} problems with particles.\n\n",
@@ -193,11 +187,9 @@ int ensemble(const Settings& s) {
     const Divergence bound = divergence_bound(fixture.ensemble);
     const ParticleState undisturbed = run_oracle(fixture.scene, walls, fixture.state, substeps);
     std::vector<Divergence> apart;
-    for (const auto& line :
-         spread(s.processes, static_cast<std::uint32_t>(s.members), [&](std::uint32_t k) {
+    for (const auto& line : spread(s.processes, static_cast<std::uint32_t>(s.members), [&](std::uint32_t k) {
            const Divergence d = divergence(
-               fixture.scene,
-               run_disturbed(fixture.scene, walls, fixture.state, substeps, 1000 + k), undisturbed);
+               fixture.scene, run_disturbed(fixture.scene, walls, fixture.state, substeps, 1000 + k), undisturbed);
            return fmt::format("{}\n", fmt::join(d, " "));
          })) {
       std::istringstream columns(line);
@@ -205,8 +197,8 @@ int ensemble(const Settings& s) {
     }
     Scene thicker = fixture.scene;
     thicker.fluid.viscosity *= 1.01;
-    const Divergence wrong = divergence(
-        fixture.scene, run_oracle(thicker, walls, fixture.state, substeps), undisturbed);
+    const Divergence wrong =
+        divergence(fixture.scene, run_oracle(thicker, walls, fixture.state, substeps), undisturbed);
     std::vector<bool> alarmed(apart.size());
     for (std::size_t m = 0; m < bound.size(); ++m) {
       std::vector<double> share;
@@ -220,9 +212,8 @@ int ensemble(const Settings& s) {
       }
       std::sort(share.begin(), share.end());
       caught = caught || wrong[m] > bound[m];
-      text += fmt::format("{:<28} {:<13} {:>8.3f} {:>8.3f} {:>7} {:>9.3g}\n", fixture.name,
-                          divergence_names[m], quantile(share, 0.5), share.back(), above,
-                          wrong[m] / bound[m]);
+      text += fmt::format("{:<28} {:<13} {:>8.3f} {:>8.3f} {:>7} {:>9.3g}\n", fixture.name, divergence_names[m],
+                          quantile(share, 0.5), share.back(), above, wrong[m] / bound[m]);
     }
     alarms += std::count(alarmed.begin(), alarmed.end(), true);
     runs += s.members;
@@ -235,10 +226,8 @@ int ensemble(const Settings& s) {
 /// Every key of a scene against every recording and the fuzzed problems.
 int coverage(const Settings& s) {
   const auto keys = test::leaf_keys_of_scenes();
-  const test::Coverage fixtures = test::coverage_of_fixtures(),
-                       fuzzing = test::coverage_of_fuzzing(s.problems);
-  return finish(s, test::coverage_table(fixtures, fuzzing),
-                fixtures.gaps(keys).empty() && fuzzing.gaps(keys).empty());
+  const test::Coverage fixtures = test::coverage_of_fixtures(), fuzzing = test::coverage_of_fuzzing(s.problems);
+  return finish(s, test::coverage_table(fixtures, fuzzing), fixtures.gaps(keys).empty() && fuzzing.gaps(keys).empty());
 }
 
 }  // namespace

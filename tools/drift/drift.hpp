@@ -25,8 +25,8 @@ inline constexpr double not_measured = std::numeric_limits<double>::quiet_NaN();
 
 /// When a list is rebuilt, and how much further than H it reaches.
 struct ListChoice {
-  int interval = 1;  // substeps between rebuilds; 0: before a pair can be missed; −1: as a series tells
-  double skin = 0;   // share of H; NaN for intervals below 1
+  int interval = 1;      // substeps between rebuilds; 0: before a pair can be missed; −1: as a series tells
+  double skin = 0;       // share of H; NaN for intervals below 1
   bool derived = false;  // the skin is the one that theory asks for (list_theory.hpp)
 
   std::string options() const;  // of the backend `list`
@@ -39,25 +39,24 @@ struct DriftPlan {
 };
 
 /// Every interval with every skin.
-std::vector<ListChoice> all_lists(const std::vector<int>& intervals,
-                                  const std::vector<double>& skins);
+std::vector<ListChoice> all_lists(const std::vector<int>& intervals, const std::vector<double>& skins);
 
 /// One list at one substep of the window.
 struct DriftSample {
   ListChoice list;
   std::int64_t substep;  // of the window, or of the scene
   Staleness stale;
-  bool proved;           // complete, by displacements
+  bool proved;  // complete, by displacements
 };
 
 /// One list over the window, and what it costs.
 struct DriftRow {
   std::string fixture;
   ListChoice list;
-  double missed_share = 0, worst_missed_share = 0;  // of the pairs within H; mean over the window, largest
-  double wall_missed_share = 0;                     // mean, of the wall's pairs
-  double deepest = 0;                               // largest (H − r)/H of a missed pair
-  double wasted_share = 0;                          // of the listed pairs, not within H; mean
+  double missed_share = 0, worst_missed_share = 0;   // of the pairs within H; mean over the window, largest
+  double wall_missed_share = 0;                      // mean, of the wall's pairs
+  double deepest = 0;                                // largest (H − r)/H of a missed pair
+  double wasted_share = 0;                           // of the listed pairs, not within H; mean
   double density_score = 0, acceleration_score = 0;  // largest over the window
   double density_rms = 0, pressure_rms = 0, acceleration_rms = 0, wall_acceleration_rms = 0;
   // Substeps after a rebuild at which a pair is first missed, and until which displacements prove that
@@ -67,7 +66,7 @@ struct DriftRow {
   double own_missed_share = not_measured, own_wall_missed_share = not_measured;
   ExpectedDrift expected;  // by theory, from the window's first state, at the list's last substep
   double substep_us = not_measured, rebuild_every = not_measured;
-  double deviation = not_measured;  // RMS of positions after the ensemble's substeps / dx
+  double deviation = not_measured;                // RMS of positions after the ensemble's substeps / dx
   double deviation_over_ensemble = not_measured;  // and over the ensemble's mean
   double energy_drift = not_measured;             // J, beside lists that are complete
   double momentum_drift = not_measured;           // kg m/s, the same
@@ -87,13 +86,13 @@ struct SafeInterval {
 struct WholePour {
   std::string fixture;
   ListChoice list;
-  std::uint32_t perturbation = 0;  // not 0: complete lists, and a start disturbed by rounding
-  std::string trouble;             // of the backend; the rest is then NaN
-  std::array<double, 5> share_at{};      // of the mass, by Place, at the end
-  std::int64_t inside = 0;               // particles seen inside a solid, largest count
+  std::uint32_t perturbation = 0;    // not 0: complete lists, and a start disturbed by rounding
+  std::string trouble;               // of the backend; the rest is then NaN
+  std::array<double, 5> share_at{};  // of the mass, by Place, at the end
+  std::int64_t inside = 0;           // particles seen inside a solid, largest count
   double kinetic_peak = not_measured, energy_lost = not_measured;  // J
-  double energy_drift = not_measured;    // RMS over the pour, over the energy lost
-  double momentum_drift = not_measured;  // RMS over the pour, over the RMS of the momentum
+  double energy_drift = not_measured;                              // RMS over the pour, over the energy lost
+  double momentum_drift = not_measured;                            // RMS over the pour, over the RMS of the momentum
   // Share of the pairs within H that its lists lacked over the pour, counted on the device.
   double missed_share = not_measured, wall_missed_share = not_measured;
   double rebuild_every = not_measured;  // substeps
@@ -138,22 +137,21 @@ void in_parallel(int n, const std::function<void(int)>& work);
 DriftRow summed_up(const std::string& fixture, const std::vector<DriftSample>& samples);
 
 /// Measures one window. \param fixture  its recorded fields are not needed
-DriftResult measure_drift(const Fixture& fixture, const DriftPlan& plan,
-                          const ListMaker& make_list);
+DriftResult measure_drift(const Fixture& fixture, const DriftPlan& plan, const ListMaker& make_list);
 
 /// Times every list from the fixture's state and follows it beside complete ones.
-void time_and_follow(const Fixture& fixture, const Walls& walls, int window,
-                     const ListMaker& make_list, DriftResult& result);
+void time_and_follow(const Fixture& fixture, const Walls& walls, int window, const ListMaker& make_list,
+                     DriftResult& result);
 
 /// For each interval the smallest skin that theory expects to stay within the tolerance in every one of
 /// these states, rounded up to 0.01.
-std::vector<ListChoice> derived_lists(const std::vector<Fixture>& fixtures,
-                                      const std::vector<int>& intervals, double tolerance);
+std::vector<ListChoice> derived_lists(const std::vector<Fixture>& fixtures, const std::vector<int>& intervals,
+                                      double tolerance);
 
 /// Runs a scene with complete lists; at `looks` moments what each list would miss just before its rebuild,
 /// and the state at each of `phases`.
-PourDrift along_pour(const Scene& scene, const DriftPlan& plan, int looks,
-                     const ListMaker& make_list, std::vector<Fixture>& phases);
+PourDrift along_pour(const Scene& scene, const DriftPlan& plan, int looks, const ListMaker& make_list,
+                     std::vector<Fixture>& phases);
 
 /// Does one part of long work: calls what it is given, or never returns.
 using DoPart = std::function<void(const std::function<void()>& part)>;
@@ -175,8 +173,7 @@ struct Recommendation {
   double next_us = not_measured;  // of the list that errs least among the faster ones
   double next_error = not_measured;
 };
-std::unique_ptr<Recommendation> recommend(const std::vector<DriftResult>& results,
-                                          double tolerance);
+std::unique_ptr<Recommendation> recommend(const std::vector<DriftResult>& results, double tolerance);
 
 /// Tables for people.
 std::string drift_table(const std::vector<DriftResult>& results);
@@ -184,7 +181,6 @@ std::string pour_table(const std::vector<PourDrift>& pours);
 
 /// Layout in oracle/formats/drift.md. \param interrupted  how far the work came; empty: it is complete
 void write_drift(const std::filesystem::path& file, const std::vector<DriftResult>& results,
-                 const std::vector<PourDrift>& pours, const BackendInfo& backend,
-                 const std::string& interrupted = {});
+                 const std::vector<PourDrift>& pours, const BackendInfo& backend, const std::string& interrupted = {});
 
 }  // namespace decant

@@ -17,9 +17,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 Vec3 momentum(const Scene& scene, const ParticleState& state) {
   return scene.particle_mass() * state.velocity.rowwise().sum();
@@ -38,8 +36,7 @@ void load_grown(const Fixture& fixture, const Walls& walls, Backend& list) {
 }
 
 /// The backend's own account of a window. Not while it is timed: counting costs more than a substep.
-void count_missed(const Fixture& fixture, const Walls& walls, Backend& list, int window,
-                  DriftRow& row) {
+void count_missed(const Fixture& fixture, const Walls& walls, Backend& list, int window, DriftRow& row) {
   load_grown(fixture, walls, list);
   require_ok(list, list.advance(window));
   const PairTotals counted = list.neighbor_stats().verified;
@@ -54,10 +51,8 @@ std::string verified(const ListChoice& list) {
 }
 
 /// Where the fluid is after the ensemble's substeps, and the time of a substep in the window after.
-ParticleState follow_one(const Fixture& fixture, const Walls& walls, Backend& list, int window,
-                         DriftRow& row) {
-  const auto substeps =
-      fixture.ensemble.members > 0 ? static_cast<int>(fixture.ensemble.substeps) : window;
+ParticleState follow_one(const Fixture& fixture, const Walls& walls, Backend& list, int window, DriftRow& row) {
+  const auto substeps = fixture.ensemble.members > 0 ? static_cast<int>(fixture.ensemble.substeps) : window;
   load_grown(fixture, walls, list);
   require_ok(list, list.advance(substeps));  // records, too
   ParticleState end;
@@ -73,8 +68,7 @@ ParticleState follow_one(const Fixture& fixture, const Walls& walls, Backend& li
     best = std::min(best, seconds);
     spent += seconds;
     row.rebuild_every = static_cast<double>(window) /
-                        static_cast<double>(std::max<std::int64_t>(
-                            1, list.neighbor_stats().rebuilds - rebuilds));
+                        static_cast<double>(std::max<std::int64_t>(1, list.neighbor_stats().rebuilds - rebuilds));
   }
   row.substep_us = 1e6 * best / window;
   return end;
@@ -82,36 +76,31 @@ ParticleState follow_one(const Fixture& fixture, const Walls& walls, Backend& li
 
 /// One pour, looked at every so many substeps.
 struct Course {
-  std::vector<double> energy;   // J
-  std::vector<Vec3> momentum;   // kg m/s
+  std::vector<double> energy;  // J
+  std::vector<Vec3> momentum;  // kg m/s
   WholePour pour;
 };
 
 constexpr int looks_at_whole = 100;
 
-Course run_course(const Scene& scene, const Walls& walls, const ParticleState& start,
-                  Backend& backend) {
+Course run_course(const Scene& scene, const Walls& walls, const ParticleState& start, Backend& backend) {
   Course course;
   Audit audit(scene);
   backend.load(scene, walls, start);
   ParticleState state = start;
-  const std::int64_t all =
-      std::int64_t{scene.schedule.frames} * scene.schedule.substeps_per_frame;
+  const std::int64_t all = std::int64_t{scene.schedule.frames} * scene.schedule.substeps_per_frame;
   for (int look = 0;; ++look) {
     const AuditResult seen = audit.look(state);
     course.energy.push_back(seen.kinetic_energy + seen.potential_energy);
     course.momentum.push_back(momentum(scene, state));
     course.pour.inside = std::max(course.pour.inside, seen.inside);
-    if (!(course.pour.kinetic_peak >= seen.kinetic_energy))
-      course.pour.kinetic_peak = seen.kinetic_energy;
+    if (!(course.pour.kinetic_peak >= seen.kinetic_energy)) course.pour.kinetic_peak = seen.kinetic_energy;
     if (look == looks_at_whole) {
       for (std::size_t p = 0; p < seen.particles_at.size(); ++p)
-        course.pour.share_at[p] =
-            static_cast<double>(seen.particles_at[p]) / static_cast<double>(state.size());
+        course.pour.share_at[p] = static_cast<double>(seen.particles_at[p]) / static_cast<double>(state.size());
       break;
     }
-    const Status status =
-        backend.advance(static_cast<int>(all * (look + 1) / looks_at_whole - state.substep));
+    const Status status = backend.advance(static_cast<int>(all * (look + 1) / looks_at_whole - state.substep));
     if (!status.ok()) {
       course.pour = {};
       course.pour.trouble = describe(status);
@@ -122,11 +111,9 @@ Course run_course(const Scene& scene, const Walls& walls, const ParticleState& s
   course.pour.energy_lost = course.energy.front() - course.energy.back();
   const NeighborStats stats = backend.neighbor_stats();
   const PairTotals& counted = stats.verified;
-  course.pour.missed_share =
-      share(counted.missed + counted.wall_missed, counted.pairs + counted.wall_pairs);
+  course.pour.missed_share = share(counted.missed + counted.wall_missed, counted.pairs + counted.wall_pairs);
   course.pour.wall_missed_share = share(counted.wall_missed, counted.wall_pairs);
-  course.pour.rebuild_every =
-      static_cast<double>(all) / static_cast<double>(std::max<std::int64_t>(1, stats.rebuilds));
+  course.pour.rebuild_every = static_cast<double>(all) / static_cast<double>(std::max<std::int64_t>(1, stats.rebuilds));
   return course;
 }
 
@@ -146,8 +133,8 @@ void compare(const Course& right, Course& course) {
 
 }  // namespace
 
-void time_and_follow(const Fixture& fixture, const Walls& walls, int window,
-                     const ListMaker& make_list, DriftResult& result) {
+void time_and_follow(const Fixture& fixture, const Walls& walls, int window, const ListMaker& make_list,
+                     DriftResult& result) {
   const auto start = Clock::now();
   const Scene& scene = fixture.scene;
   DriftRow adaptive;
@@ -166,8 +153,7 @@ void time_and_follow(const Fixture& fixture, const Walls& walls, int window,
     row.deviation = away[0] / scene.particle_spacing;
     row.energy_drift = away[4];
     row.momentum_drift = (momentum(scene, end) - momentum(scene, right)).norm();
-    if (fixture.ensemble.members > 0)
-      row.deviation_over_ensemble = away[0] / fixture.ensemble.mean[0];
+    if (fixture.ensemble.members > 0) row.deviation_over_ensemble = away[0] / fixture.ensemble.mean[0];
   }
   result.rows.push_back(adaptive);
   result.run_seconds = seconds_since(start);
@@ -190,8 +176,7 @@ void whole_pours(const Scene& scene, const DriftPlan& plan, int disturbed, const
   };
   const ListChoice complete{0, not_measured, false};
   Course right = run(start, complete);
-  if (!right.pour.trouble.empty())
-    throw BackendError(scene.name + ", complete lists: " + right.pour.trouble);
+  if (!right.pour.trouble.empty()) throw BackendError(scene.name + ", complete lists: " + right.pour.trouble);
   compare(right, right);
   add(right, complete, 0);
   for (int k = 1; k <= disturbed; ++k) {

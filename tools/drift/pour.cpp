@@ -11,12 +11,11 @@
 
 namespace decant {
 
-PourDrift along_pour(const Scene& scene, const DriftPlan& plan, int looks,
-                     const ListMaker& make_list, std::vector<Fixture>& phases) {
+PourDrift along_pour(const Scene& scene, const DriftPlan& plan, int looks, const ListMaker& make_list,
+                     std::vector<Fixture>& phases) {
   const Walls walls = sample_walls(scene);
   const WallAnswer volumes = wall_answer(scene, walls);
-  const std::int64_t all =
-      std::int64_t{scene.schedule.frames} * scene.schedule.substeps_per_frame;
+  const std::int64_t all = std::int64_t{scene.schedule.frames} * scene.schedule.substeps_per_frame;
   std::set<int> ages = {0};
   for (const ListChoice& list : plan.lists) ages.insert(list.interval - 1);
 
@@ -31,9 +30,8 @@ PourDrift along_pour(const Scene& scene, const DriftPlan& plan, int looks,
   // Phases lie between the moments; each is passed on the way to the next moment.
   std::vector<Fixture*> waiting;
   for (Fixture& phase : phases) waiting.push_back(&phase);
-  std::stable_sort(waiting.begin(), waiting.end(), [](const Fixture* a, const Fixture* b) {
-    return a->state.substep < b->state.substep;
-  });
+  std::stable_sort(waiting.begin(), waiting.end(),
+                   [](const Fixture* a, const Fixture* b) { return a->state.substep < b->state.substep; });
   auto next = waiting.begin();
   const auto pass_phases = [&](std::int64_t until) {
     for (; next != waiting.end() && (*next)->state.substep <= until; ++next) {
@@ -62,14 +60,11 @@ PourDrift along_pour(const Scene& scene, const DriftPlan& plan, int looks,
     std::vector<PourMoment> moments(plan.lists.size());
     in_parallel(static_cast<int>(plan.lists.size()), [&](int k) {
       const ListChoice& list = plan.lists[static_cast<std::size_t>(k)];
-      const auto at = static_cast<std::size_t>(
-          std::distance(ages.begin(), ages.find(list.interval - 1)));
-      const Staleness stale =
-          StaleList(scene, volumes.volume, instants.front(), list.skin).at(instants[at]);
+      const auto at = static_cast<std::size_t>(std::distance(ages.begin(), ages.find(list.interval - 1)));
+      const Staleness stale = StaleList(scene, volumes.volume, instants.front(), list.skin).at(instants[at]);
       moments[static_cast<std::size_t>(k)] = {
           scene.time_at(built),
-          {list, built + list.interval - 1, stale,
-           stale.provably_complete(list.skin, scene.support_radius())}};
+          {list, built + list.interval - 1, stale, stale.provably_complete(list.skin, scene.support_radius())}};
     });
     pour.moments.insert(pour.moments.end(), moments.begin(), moments.end());
   }

@@ -12,9 +12,7 @@ namespace {
 /// The row of that list; all adaptive lists are one.
 const DriftRow* same_list(const DriftResult& result, const ListChoice& list) {
   for (const DriftRow& row : result.rows)
-    if (row.list.interval == list.interval &&
-        (list.interval == 0 || row.list.skin == list.skin))
-      return &row;
+    if (row.list.interval == list.interval && (list.interval == 0 || row.list.skin == list.skin)) return &row;
   return nullptr;
 }
 
@@ -23,8 +21,7 @@ double larger(double a, double b) { return !(b <= a) ? b : a; }
 
 }  // namespace
 
-std::unique_ptr<Recommendation> recommend(const std::vector<DriftResult>& results,
-                                          double tolerance) {
+std::unique_ptr<Recommendation> recommend(const std::vector<DriftResult>& results, double tolerance) {
   std::unique_ptr<Recommendation> best;
   if (results.empty()) return best;
   const auto parts = static_cast<double>(results.size());
@@ -43,10 +40,8 @@ std::unique_ptr<Recommendation> recommend(const std::vector<DriftResult>& result
       r.adaptive_us += adaptive->substep_us / parts;
     }
     if (!everywhere) continue;
-    if (!(r.worst_error <= 0.5 * tolerance))
-      beyond.push_back(r);
-    else if (!best || r.substep_us < best->substep_us)
-      best = std::make_unique<Recommendation>(r);
+    if (!(r.worst_error <= 0.5 * tolerance)) beyond.push_back(r);
+    else if (!best || r.substep_us < best->substep_us) best = std::make_unique<Recommendation>(r);
   }
   for (const Recommendation& r : beyond) {
     if (!best || r.substep_us >= best->substep_us || best->next_error <= r.worst_error) continue;

@@ -19,8 +19,7 @@ std::string number(double value, const char* format = "{:.1e}") {
 
 std::string percent(double share) {
   if (std::isnan(share)) return "-";
-  return share == 0 ? "0" : share < 1e-4 ? fmt::format("{:.0e}", share)
-                                         : fmt::format("{:.2f} %", 100 * share);
+  return share == 0 ? "0" : share < 1e-4 ? fmt::format("{:.0e}", share) : fmt::format("{:.2f} %", 100 * share);
 }
 
 /// Columns of equal length in one group.
@@ -61,58 +60,53 @@ class Columns {
 template <class Row>
 void list_columns(Columns<Row>& c) {
   c.text("fixture", [](const Row& r) { return r.fixture; });
-  c.whole("interval", [](const Row& r) { return r.list.interval; },
-          "substeps between rebuilds; 0: before a pair can be missed; -1: as a series tells");
-  c.real("skin", "1", [](const Row& r) { return r.list.skin; },
-         "share of H; NaN for intervals below 1");
-  c.whole("derived", [](const Row& r) { return r.list.derived; },
-          "1: the skin that theory asks for");
+  c.whole(
+      "interval", [](const Row& r) { return r.list.interval; },
+      "substeps between rebuilds; 0: before a pair can be missed; -1: as a series tells");
+  c.real("skin", "1", [](const Row& r) { return r.list.skin; }, "share of H; NaN for intervals below 1");
+  c.whole("derived", [](const Row& r) { return r.list.derived; }, "1: the skin that theory asks for");
 }
 
 void write_rows(Hdf5Writer& out, const std::vector<DriftRow>& rows) {
   using R = DriftRow;
   Columns<R> c(out, "/rows", rows);
   list_columns(c);
-  c.whole("first_miss", [](const R& r) { return r.first_miss; },
-          "substeps after a rebuild, the earliest; the interval where nothing is missed");
-  c.whole("proved_until", [](const R& r) { return r.proved_until; },
-          "substeps after a rebuild for which displacements prove the list complete");
-  c.real("missed_share", "1", [](const R& r) { return r.missed_share; },
-         "of the pairs within H, mean over the window");
+  c.whole(
+      "first_miss", [](const R& r) { return r.first_miss; },
+      "substeps after a rebuild, the earliest; the interval where nothing is missed");
+  c.whole(
+      "proved_until", [](const R& r) { return r.proved_until; },
+      "substeps after a rebuild for which displacements prove the list complete");
+  c.real("missed_share", "1", [](const R& r) { return r.missed_share; }, "of the pairs within H, mean over the window");
   c.real("worst_missed_share", "1", [](const R& r) { return r.worst_missed_share; });
-  c.real("wall_missed_share", "1", [](const R& r) { return r.wall_missed_share; },
-         "of the wall's pairs, mean");
+  c.real("wall_missed_share", "1", [](const R& r) { return r.wall_missed_share; }, "of the wall's pairs, mean");
   c.real("deepest", "1", [](const R& r) { return r.deepest; }, "(H - r)/H of a missed pair");
-  c.real("wasted_share", "1", [](const R& r) { return r.wasted_share; },
-         "of the listed pairs, not within H");
-  c.real("density_score", "1", [](const R& r) { return r.density_score; },
-         "largest error over what fp32 is allowed");
+  c.real("wasted_share", "1", [](const R& r) { return r.wasted_share; }, "of the listed pairs, not within H");
+  c.real("density_score", "1", [](const R& r) { return r.density_score; }, "largest error over what fp32 is allowed");
   c.real("acceleration_score", "1", [](const R& r) { return r.acceleration_score; });
-  c.real("density_rms", "1", [](const R& r) { return r.density_rms; },
-         "RMS error over RMS field, largest over the window");
+  c.real(
+      "density_rms", "1", [](const R& r) { return r.density_rms; },
+      "RMS error over RMS field, largest over the window");
   c.real("pressure_rms", "1", [](const R& r) { return r.pressure_rms; });
-  c.real("acceleration_rms", "1", [](const R& r) { return r.acceleration_rms; },
-         "gravity left out");
-  c.real("wall_acceleration_rms", "1", [](const R& r) { return r.wall_acceleration_rms; },
-         "the wall's terms alone");
-  c.real("own_missed_share", "1", [](const R& r) { return r.own_missed_share; },
-         "of the backend's own lists in the same window, counted on the device; NaN: not run");
+  c.real("acceleration_rms", "1", [](const R& r) { return r.acceleration_rms; }, "gravity left out");
+  c.real("wall_acceleration_rms", "1", [](const R& r) { return r.wall_acceleration_rms; }, "the wall's terms alone");
+  c.real(
+      "own_missed_share", "1", [](const R& r) { return r.own_missed_share; },
+      "of the backend's own lists in the same window, counted on the device; NaN: not run");
   c.real("own_wall_missed_share", "1", [](const R& r) { return r.own_wall_missed_share; });
-  c.real("expected_missed_share", "1", [](const R& r) { return r.expected.missed_share; },
-         "by theory, from the first state, at the last substep before a rebuild");
+  c.real(
+      "expected_missed_share", "1", [](const R& r) { return r.expected.missed_share; },
+      "by theory, from the first state, at the last substep before a rebuild");
   c.real("expected_density_rms", "1", [](const R& r) { return r.expected.density_rms; });
-  c.real("expected_acceleration_rms", "1",
-         [](const R& r) { return r.expected.acceleration_rms; });
+  c.real("expected_acceleration_rms", "1", [](const R& r) { return r.expected.acceleration_rms; });
   c.real("substep_us", "us", [](const R& r) { return r.substep_us; }, "amortised; NaN: not timed");
-  c.real("rebuild_every", "1", [](const R& r) { return r.rebuild_every; },
-         "substeps a rebuild, as the backend counts");
-  c.real("deviation", "1", [](const R& r) { return r.deviation; },
-         "RMS of positions beside complete lists, over dx");
-  c.real("deviation_over_ensemble", "1", [](const R& r) { return r.deviation_over_ensemble; },
-         "over that of runs disturbed by rounding");
+  c.real("rebuild_every", "1", [](const R& r) { return r.rebuild_every; }, "substeps a rebuild, as the backend counts");
+  c.real("deviation", "1", [](const R& r) { return r.deviation; }, "RMS of positions beside complete lists, over dx");
+  c.real(
+      "deviation_over_ensemble", "1", [](const R& r) { return r.deviation_over_ensemble; },
+      "over that of runs disturbed by rounding");
   c.real("energy_drift", "J", [](const R& r) { return r.energy_drift; }, "beside complete lists");
-  c.real("momentum_drift", "kg m/s", [](const R& r) { return r.momentum_drift; },
-         "beside complete lists");
+  c.real("momentum_drift", "kg m/s", [](const R& r) { return r.momentum_drift; }, "beside complete lists");
 }
 
 /// A sample and whose it is.
@@ -159,22 +153,22 @@ void write_whole(Hdf5Writer& out, const std::vector<WholePour>& pours) {
   using W = WholePour;
   Columns<W> c(out, "/whole", pours);
   list_columns(c);
-  c.whole("perturbation", [](const W& w) { return w.perturbation; },
-          "seed of a start disturbed by rounding; 0: none");
+  c.whole("perturbation", [](const W& w) { return w.perturbation; }, "seed of a start disturbed by rounding; 0: none");
   c.text("trouble", [](const W& w) { return w.trouble.empty() ? "none" : w.trouble; });
   for (std::size_t p = 0; p < place_names.size(); ++p)
-    c.real((std::string("share_") + place_names[p]).c_str(), "1",
-           [p](const W& w) { return w.share_at[p]; });
-  c.whole("inside", [](const W& w) { return w.inside; },
-          "particles seen inside a wall, most at once");
+    c.real((std::string("share_") + place_names[p]).c_str(), "1", [p](const W& w) { return w.share_at[p]; });
+  c.whole("inside", [](const W& w) { return w.inside; }, "particles seen inside a wall, most at once");
   c.real("kinetic_peak", "J", [](const W& w) { return w.kinetic_peak; });
   c.real("energy_lost", "J", [](const W& w) { return w.energy_lost; });
-  c.real("energy_drift", "1", [](const W& w) { return w.energy_drift; },
-         "RMS difference from complete lists over the energy lost");
-  c.real("momentum_drift", "1", [](const W& w) { return w.momentum_drift; },
-         "RMS difference from complete lists over the RMS momentum");
-  c.real("missed_share", "1", [](const W& w) { return w.missed_share; },
-         "of the pairs within H over the pour, counted on the device");
+  c.real(
+      "energy_drift", "1", [](const W& w) { return w.energy_drift; },
+      "RMS difference from complete lists over the energy lost");
+  c.real(
+      "momentum_drift", "1", [](const W& w) { return w.momentum_drift; },
+      "RMS difference from complete lists over the RMS momentum");
+  c.real(
+      "missed_share", "1", [](const W& w) { return w.missed_share; },
+      "of the pairs within H over the pour, counted on the device");
   c.real("wall_missed_share", "1", [](const W& w) { return w.wall_missed_share; });
   c.real("rebuild_every", "1", [](const W& w) { return w.rebuild_every; }, "substeps, mean");
 }
@@ -191,41 +185,37 @@ std::string drift_table(const std::vector<DriftResult>& results) {
     text += fmt::format(
         "{}: {} particles, measured in {:.1f} s\n"
         "  {:>5} {:>5} {:>8} {:>8} {:>8} {:>8} {:>8} {:>6} {:>6} {:>8} {:>8} {:>8} {:>8} {:>9} {:>8}\n",
-        result.fixture, result.particles, result.measured_seconds, "every", "skin", "missed",
-        "own", "worst", "expected", "wall's", "first", "proved", "density", "accel.", "expected", "wall's",
-        "deviation", "us");
+        result.fixture, result.particles, result.measured_seconds, "every", "skin", "missed", "own", "worst",
+        "expected", "wall's", "first", "proved", "density", "accel.", "expected", "wall's", "deviation", "us");
     for (const DriftRow& row : result.rows) {
       const bool measured = row.list.interval != 0;
       const auto miss = [&](double share) { return measured ? percent(share) : "-"; };
       const auto error = [&](double e) { return measured ? number(e) : "-"; };
-      text += fmt::format(
-          "  {:>5} {:>5} {:>8} {:>8} {:>8} {:>8} {:>8} {:>6} {:>6} {:>8} {:>8} {:>8} {:>8} {:>9} {:>8}\n",
-          name_of(row.list),
-          number(row.list.skin, "{:.2f}") + (row.list.derived ? "*" : ""), miss(row.missed_share),
-          percent(row.own_missed_share), miss(row.worst_missed_share), miss(row.expected.missed_share),
-          miss(row.wall_missed_share),
-          !measured || row.first_miss == row.list.interval ? "-"
-                                                           : fmt::format("{}", row.first_miss),
-          !measured ? "-"
-          : row.proved_until == row.list.interval ? "all"
-                                                  : fmt::format("{}", row.proved_until),
-          error(row.density_rms), error(row.acceleration_rms),
-          error(row.expected.acceleration_rms), error(row.wall_acceleration_rms),
-          number(row.deviation_over_ensemble, "{:.2f}"), number(row.substep_us, "{:.1f}"));
+      text +=
+          fmt::format("  {:>5} {:>5} {:>8} {:>8} {:>8} {:>8} {:>8} {:>6} {:>6} {:>8} {:>8} {:>8} {:>8} {:>9} {:>8}\n",
+                      name_of(row.list), number(row.list.skin, "{:.2f}") + (row.list.derived ? "*" : ""),
+                      miss(row.missed_share), percent(row.own_missed_share), miss(row.worst_missed_share),
+                      miss(row.expected.missed_share), miss(row.wall_missed_share),
+                      !measured || row.first_miss == row.list.interval ? "-" : fmt::format("{}", row.first_miss),
+                      !measured                               ? "-"
+                      : row.proved_until == row.list.interval ? "all"
+                                                              : fmt::format("{}", row.proved_until),
+                      error(row.density_rms), error(row.acceleration_rms), error(row.expected.acceleration_rms),
+                      error(row.wall_acceleration_rms), number(row.deviation_over_ensemble, "{:.2f}"),
+                      number(row.substep_us, "{:.1f}"));
     }
   }
-  text += fmt::format("\n{:<28} {:>5} {:>9} {:>9} {:>9} {:>9}   powers of the relative motion\n",
-                      "safe interval", "skin", "measured", "proved", "by speeds", "by pairs");
+  text += fmt::format("\n{:<28} {:>5} {:>9} {:>9} {:>9} {:>9}   powers of the relative motion\n", "safe interval",
+                      "skin", "measured", "proved", "by speeds", "by pairs");
   for (const DriftResult& result : results)
     for (const SafeInterval& safe : result.safe) {
       std::string powers;
       for (std::size_t k = 0; safe.skin == 0 && k < 3; ++k)
         powers += fmt::format("   {} {}±{} ({:.0f})", std::array{"missed", "density", "accel."}[k],
-                              number(result.powers[k].power, "{:.2f}"),
-                              number(result.powers[k].confidence, "{:.2f}"), result.edge_powers[k]);
-      text += fmt::format("{:<28} {:>5.2f} {:>9} {:>9} {:>9} {:>9}{}\n", safe.fixture, safe.skin,
-                          safe.measured, safe.proved, safe.expected, safe.expected_relative,
-                          powers);
+                              number(result.powers[k].power, "{:.2f}"), number(result.powers[k].confidence, "{:.2f}"),
+                              result.edge_powers[k]);
+      text += fmt::format("{:<28} {:>5.2f} {:>9} {:>9} {:>9} {:>9}{}\n", safe.fixture, safe.skin, safe.measured,
+                          safe.proved, safe.expected, safe.expected_relative, powers);
     }
   return text;
 }
@@ -234,24 +224,21 @@ std::string pour_table(const std::vector<PourDrift>& pours) {
   std::string text;
   for (const PourDrift& pour : pours) {
     if (pour.whole.empty()) continue;
-    text += fmt::format("\n{}, the whole pour\n  {:>9} {:>5} {:>10} {:>8} {:>8} {:>8} {:>7} "
-                        "{:>9} {:>9} {:>8} {:>8} {:>8}\n",
-                        pour.fixture, "every", "skin", "receiver", "source", "spilled", "lost",
-                        "inside", "energy", "momentum", "missed", "wall's", "rebuilt");
+    text += fmt::format(
+        "\n{}, the whole pour\n  {:>9} {:>5} {:>10} {:>8} {:>8} {:>8} {:>7} "
+        "{:>9} {:>9} {:>8} {:>8} {:>8}\n",
+        pour.fixture, "every", "skin", "receiver", "source", "spilled", "lost", "inside", "energy", "momentum",
+        "missed", "wall's", "rebuilt");
     for (const WholePour& w : pour.whole) {
-      const std::string name =
-          w.perturbation ? fmt::format("auto ±{}", w.perturbation) : name_of(w.list);
+      const std::string name = w.perturbation ? fmt::format("auto ±{}", w.perturbation) : name_of(w.list);
       if (!w.trouble.empty()) {
         text += fmt::format("  {:>9} {:>5} {}\n", name, number(w.list.skin, "{:.2f}"), w.trouble);
         continue;
       }
-      const auto at = [&](Place place) {
-        return percent(w.share_at[static_cast<std::size_t>(place)]);
-      };
-      text += fmt::format("  {:>9} {:>5} {:>10} {:>8} {:>8} {:>8} {:>7} {:>9} {:>9} {:>8} {:>8} {:>8.1f}\n",
-                          name, number(w.list.skin, "{:.2f}"), at(Place::receiver),
-                          at(Place::source), at(Place::spilled), at(Place::lost), w.inside,
-                          percent(w.energy_drift), percent(w.momentum_drift),
+      const auto at = [&](Place place) { return percent(w.share_at[static_cast<std::size_t>(place)]); };
+      text += fmt::format("  {:>9} {:>5} {:>10} {:>8} {:>8} {:>8} {:>7} {:>9} {:>9} {:>8} {:>8} {:>8.1f}\n", name,
+                          number(w.list.skin, "{:.2f}"), at(Place::receiver), at(Place::source), at(Place::spilled),
+                          at(Place::lost), w.inside, percent(w.energy_drift), percent(w.momentum_drift),
                           percent(w.missed_share), percent(w.wall_missed_share), w.rebuild_every);
     }
   }
@@ -259,8 +246,7 @@ std::string pour_table(const std::vector<PourDrift>& pours) {
 }
 
 void write_drift(const std::filesystem::path& file, const std::vector<DriftResult>& results,
-                 const std::vector<PourDrift>& pours, const BackendInfo& backend,
-                 const std::string& interrupted) {
+                 const std::vector<PourDrift>& pours, const BackendInfo& backend, const std::string& interrupted) {
   Hdf5Writer out(file);
   out.attribute("/", "decant_drift", 1);
   out.attribute("/", "backend", backend.name);
@@ -275,8 +261,7 @@ void write_drift(const std::filesystem::path& file, const std::vector<DriftResul
   for (const DriftResult& result : results) {
     rows.insert(rows.end(), result.rows.begin(), result.rows.end());
     safe.insert(safe.end(), result.safe.begin(), result.safe.end());
-    for (const DriftSample& s : result.samples)
-      samples.push_back({result.fixture, not_measured, s.list, &s});
+    for (const DriftSample& s : result.samples) samples.push_back({result.fixture, not_measured, s.list, &s});
   }
   for (const PourDrift& pour : pours) {
     whole.insert(whole.end(), pour.whole.begin(), pour.whole.end());
@@ -295,8 +280,9 @@ void write_drift(const std::filesystem::path& file, const std::vector<DriftResul
     c.whole("measured", [](const S& s) { return s.measured; }, "substeps; at most the window");
     c.whole("proved", [](const S& s) { return s.proved; }, "by the displacements seen");
     c.whole("expected", [](const S& s) { return s.expected; }, "by the first state's speeds");
-    c.whole("expected_relative", [](const S& s) { return s.expected_relative; },
-            "by how fast the first state's pairs near H approach");
+    c.whole(
+        "expected_relative", [](const S& s) { return s.expected_relative; },
+        "by how fast the first state's pairs near H approach");
   }
   using R = DriftResult;
   Columns<R> c(out, "/fixtures", results);
@@ -304,16 +290,14 @@ void write_drift(const std::filesystem::path& file, const std::vector<DriftResul
   c.whole("particles", [](const R& r) { return r.particles; });
   c.real("support_radius", "m", [](const R& r) { return r.support_radius; });
   c.real("measured_seconds", "s", [](const R& r) { return r.measured_seconds; });
-  c.real("run_seconds", "s", [](const R& r) { return r.run_seconds; },
-         "of them, timing and following the lists");
+  c.real("run_seconds", "s", [](const R& r) { return r.run_seconds; }, "of them, timing and following the lists");
   for (std::size_t k = 0; k < 3; ++k) {
     const std::string name = std::array{"missed", "density", "acceleration"}[k];
     c.real((name + "_power").c_str(), "1", [k](const R& r) { return r.powers[k].power; },
            "of the relative motion since the build, without skin");
-    c.real((name + "_power_confidence").c_str(), "1",
-           [k](const R& r) { return r.powers[k].confidence; }, "half width, 95 %");
-    c.real((name + "_power_expected").c_str(), "1",
-           [k](const R& r) { return r.edge_powers[k]; });
+    c.real((name + "_power_confidence").c_str(), "1", [k](const R& r) { return r.powers[k].confidence; },
+           "half width, 95 %");
+    c.real((name + "_power_expected").c_str(), "1", [k](const R& r) { return r.edge_powers[k]; });
   }
   out.commit();
 }

@@ -15,9 +15,8 @@ namespace decant {
 namespace {
 
 /// One kind of neighbors, ascending.
-std::vector<std::vector<std::int32_t>> read_lists(const Hdf5Reader& in, const std::string& path,
-                                                  std::int64_t particles, std::int64_t targets,
-                                                  bool own_ids) {
+std::vector<std::vector<std::int32_t>> read_lists(const Hdf5Reader& in, const std::string& path, std::int64_t particles,
+                                                  std::int64_t targets, bool own_ids) {
   const IdVector count = in.integers(path + "_count", particles);
   std::int64_t sum = 0;
   for (const std::int64_t c : count) {
@@ -32,8 +31,7 @@ std::vector<std::vector<std::int32_t>> read_lists(const Hdf5Reader& in, const st
     for (std::int64_t c = 0; c < count[static_cast<Eigen::Index>(i)]; ++c) {
       const std::int64_t j = entries[at++];
       if (j < 0 || j >= targets)
-        in.fail(path, fmt::format("entry {} of particle {}", j, i),
-                fmt::format("0 to {}", targets - 1));
+        in.fail(path, fmt::format("entry {} of particle {}", j, i), fmt::format("0 to {}", targets - 1));
       if (own_ids && j == static_cast<std::int64_t>(i))
         in.fail(path, fmt::format("particle {} in its own list", i), "others only");
       list.push_back(static_cast<std::int32_t>(j));
@@ -83,8 +81,7 @@ DriftResult measure_series(const Fixture& fixture, const std::filesystem::path& 
     ParticleState state;
     state.substep = in.integers(group + "/substep", 1)[0];
     if (k > 0 && state.substep <= substeps.back())
-      in.fail(group + "/substep", fmt::format("{} after {}", state.substep, substeps.back()),
-              "ascending");
+      in.fail(group + "/substep", fmt::format("{} after {}", state.substep, substeps.back()), "ascending");
     state.position = in.matrix3(group + "/position", n);
     state.velocity = in.matrix3(group + "/velocity", n);
     if (!state.position.allFinite() || !state.velocity.allFinite())
@@ -107,13 +104,11 @@ DriftResult measure_series(const Fixture& fixture, const std::filesystem::path& 
       listed.fluid = read_lists(in, group + "/fluid", n, n, true);
       require_both_directions(in, group + "/fluid", listed.fluid);
       listed.wall = read_lists(in, group + "/wall", n, walls.size(), false);
-      list = lists.emplace(used[k], StaleList(scene, volumes.volume, then->second, std::move(listed)))
-                 .first;
+      list = lists.emplace(used[k], StaleList(scene, volumes.volume, then->second, std::move(listed))).first;
     }
     const Staleness stale = list->second.at(instants[substeps[k]]);
     if (stale.age < 0)
-      in.fail(fmt::format("/state/{}/list", k), fmt::format("{}", used[k]),
-              "a list built at or before the state");
+      in.fail(fmt::format("/state/{}/list", k), fmt::format("{}", used[k]), "a list built at or before the state");
     samples.push_back({{-1, not_measured, false}, substeps[k], stale, false});
   }
   DriftResult result;
@@ -126,8 +121,7 @@ DriftResult measure_series(const Fixture& fixture, const std::filesystem::path& 
   result.rows.back().expected = {not_measured, not_measured, not_measured};
   result.samples = std::move(samples);
   result.edge_powers = edge_powers(scene);
-  result.measured_seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  result.measured_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return result;
 }
 

@@ -18,12 +18,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-std::vector<ParticleState> run_window(const Fixture& fixture, const Walls& walls, Backend& backend,
-                                      int substeps) {
+std::vector<ParticleState> run_window(const Fixture& fixture, const Walls& walls, Backend& backend, int substeps) {
   std::vector<ParticleState> states(static_cast<std::size_t>(substeps) + 1);
   backend.load(fixture.scene, walls, fixture.state);
   states[0] = fixture.state;
@@ -50,9 +47,8 @@ std::vector<Build> builds_of(const DriftPlan& plan) {
     }
   std::vector<Build> builds;
   for (const auto& [key, end] : last) builds.push_back({key.first, key.second, end, {}});
-  std::stable_sort(builds.begin(), builds.end(), [](const Build& a, const Build& b) {
-    return a.last - a.built > b.last - b.built;
-  });
+  std::stable_sort(builds.begin(), builds.end(),
+                   [](const Build& a, const Build& b) { return a.last - a.built > b.last - b.built; });
   return builds;
 }
 
@@ -88,8 +84,7 @@ void fit_powers(const Scene& scene, const std::vector<Instant>& window, DriftRes
   for (const auto& s : result.samples) {
     if (s.list.skin != 0 || s.list.interval != longest || s.stale.age == 0) continue;
     const auto k = static_cast<std::size_t>(s.substep);
-    const double moved =
-        relative_motion(scene, window[k - static_cast<std::size_t>(s.stale.age)], window[k]);
+    const double moved = relative_motion(scene, window[k - static_cast<std::size_t>(s.stale.age)], window[k]);
     points[0].emplace_back(moved, static_cast<double>(s.stale.fluid.missed));
     points[1].emplace_back(moved, s.stale.density.mean);
     points[2].emplace_back(moved, s.stale.acceleration.mean);
@@ -100,24 +95,19 @@ void fit_powers(const Scene& scene, const std::vector<Instant>& window, DriftRes
 
 /// Earliest age at which a list of that skin misses or may miss a pair; the window where none does. Skins
 /// that theory chose for one interval were not looked at for longer.
-std::vector<SafeInterval> safe_intervals(const Scene& scene, const PairsNearEdge& near,
-                                         const DriftPlan& plan, const std::vector<Build>& builds,
-                                         const std::string& fixture) {
+std::vector<SafeInterval> safe_intervals(const Scene& scene, const PairsNearEdge& near, const DriftPlan& plan,
+                                         const std::vector<Build>& builds, const std::string& fixture) {
   std::map<double, SafeInterval> by_skin;
   for (const Build& build : builds) {
-    if (std::none_of(plan.lists.begin(), plan.lists.end(), [&](const ListChoice& list) {
-          return !list.derived && list.skin == build.skin;
-        }))
+    if (std::none_of(plan.lists.begin(), plan.lists.end(),
+                     [&](const ListChoice& list) { return !list.derived && list.skin == build.skin; }))
       continue;
-    auto& safe = by_skin
-                     .try_emplace(build.skin, SafeInterval{fixture, build.skin, plan.window,
-                                                           plan.window, 0, 0})
+    auto& safe = by_skin.try_emplace(build.skin, SafeInterval{fixture, build.skin, plan.window, plan.window, 0, 0})
                      .first->second;
     for (const Staleness& s : build.ages) {
       const int age = static_cast<int>(s.age);
       if (s.fluid.missed + s.wall.missed > 0) safe.measured = std::min(safe.measured, age);
-      if (!s.provably_complete(build.skin, scene.support_radius()))
-        safe.proved = std::min(safe.proved, age);
+      if (!s.provably_complete(build.skin, scene.support_radius())) safe.proved = std::min(safe.proved, age);
     }
   }
   std::vector<SafeInterval> all;
@@ -143,8 +133,7 @@ DriftRow summed_up(const std::string& fixture, const std::vector<DriftSample>& s
   const auto n = static_cast<double>(samples.size());
   for (const DriftSample& sample : samples) {
     const Staleness& s = sample.stale;
-    const std::int64_t missed = s.fluid.missed + s.wall.missed,
-                       within = s.fluid.within + s.wall.within,
+    const std::int64_t missed = s.fluid.missed + s.wall.missed, within = s.fluid.within + s.wall.within,
                        listed = s.fluid.listed + s.wall.listed;
     row.missed_share += share(missed, within) / n;
     raise(row.worst_missed_share, share(missed, within));
@@ -168,8 +157,7 @@ std::string ListChoice::options() const {
   return interval == 0 ? "" : fmt::format("rebuild={}:skin={}", interval, skin);
 }
 
-std::vector<ListChoice> all_lists(const std::vector<int>& intervals,
-                                  const std::vector<double>& skins) {
+std::vector<ListChoice> all_lists(const std::vector<int>& intervals, const std::vector<double>& skins) {
   std::vector<ListChoice> lists;
   for (const double skin : skins)
     for (const int interval : intervals) lists.push_back({interval, skin, false});
@@ -194,15 +182,15 @@ void in_parallel(int n, const std::function<void(int)>& work) {
   if (trouble) std::rethrow_exception(trouble);
 }
 
-std::vector<ListChoice> derived_lists(const std::vector<Fixture>& fixtures,
-                                      const std::vector<int>& intervals, double tolerance) {
+std::vector<ListChoice> derived_lists(const std::vector<Fixture>& fixtures, const std::vector<int>& intervals,
+                                      double tolerance) {
   std::vector<ListChoice> lists;
   for (const int interval : intervals) lists.push_back({interval, 0, true});
   for (const Fixture& fixture : fixtures) {
     const Walls walls = sample_walls(fixture.scene);
     const WallAnswer volumes = wall_answer(fixture.scene, walls);
-    const PairsNearEdge near = pairs_near_edge(
-        fixture.scene, volumes.volume, look_at(fixture.scene, walls, volumes, fixture.state));
+    const PairsNearEdge near =
+        pairs_near_edge(fixture.scene, volumes.volume, look_at(fixture.scene, walls, volumes, fixture.state));
     for (ListChoice& list : lists) {
       const double age = (list.interval - 1) * fixture.scene.time_step();
       const double skin = skin_for(fixture.scene, near, age, tolerance);
@@ -212,8 +200,7 @@ std::vector<ListChoice> derived_lists(const std::vector<Fixture>& fixtures,
   return lists;
 }
 
-DriftResult measure_drift(const Fixture& fixture, const DriftPlan& plan,
-                          const ListMaker& make_list) {
+DriftResult measure_drift(const Fixture& fixture, const DriftPlan& plan, const ListMaker& make_list) {
   const auto start = Clock::now();
   const Scene& scene = fixture.scene;
   const Walls walls = sample_walls(scene);
@@ -243,16 +230,13 @@ DriftResult measure_drift(const Fixture& fixture, const DriftPlan& plan,
     std::vector<DriftSample> samples;
     for (int k = 0; k < plan.window; ++k) {
       const int built = k - k % list.interval;
-      const auto build = std::find_if(builds.begin(), builds.end(), [&](const Build& b) {
-        return b.skin == list.skin && b.built == built;
-      });
+      const auto build = std::find_if(builds.begin(), builds.end(),
+                                      [&](const Build& b) { return b.skin == list.skin && b.built == built; });
       const Staleness& stale = build->ages[static_cast<std::size_t>(k - built)];
-      samples.push_back(
-          {list, k, stale, stale.provably_complete(list.skin, scene.support_radius())});
+      samples.push_back({list, k, stale, stale.provably_complete(list.skin, scene.support_radius())});
     }
     result.rows.push_back(summed_up(fixture.name, samples));
-    result.rows.back().expected =
-        expected_drift(scene, near, (list.interval - 1) * scene.time_step(), list.skin);
+    result.rows.back().expected = expected_drift(scene, near, (list.interval - 1) * scene.time_step(), list.skin);
     result.samples.insert(result.samples.end(), samples.begin(), samples.end());
   }
   result.safe = safe_intervals(scene, near, plan, builds, fixture.name);

@@ -55,8 +55,8 @@ class Running {
   double seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
 
   bool over(std::int64_t next) const {
-    return ended_ || (s_.cases >= 0 && next >= s_.cases) ||
-           (s_.seconds > 0 && seconds() >= s_.seconds) || (s_.stop && s_.stop());
+    return ended_ || (s_.cases >= 0 && next >= s_.cases) || (s_.seconds > 0 && seconds() >= s_.seconds) ||
+           (s_.stop && s_.stop());
   }
 
   void work() {
@@ -138,12 +138,9 @@ class Running {
 
 }  // namespace
 
-Campaign run_campaign(const Settings& settings, const BackendMaker& make) {
-  return Running(settings, make).run();
-}
+Campaign run_campaign(const Settings& settings, const BackendMaker& make) { return Running(settings, make).run(); }
 
-std::string write_problem(const std::filesystem::path& folder, const Genome& genome,
-                          const std::string& name,
+std::string write_problem(const std::filesystem::path& folder, const Genome& genome, const std::string& name,
                           const std::map<std::string, std::string>& provenance) {
   std::filesystem::create_directories(folder);
   Fixture fixture = problem_of(genome, name);
@@ -160,13 +157,12 @@ std::string write_finding(const std::filesystem::path& folder, const Finding& fi
   std::string backend = finding.outcome.backend;
   for (char& c : backend)
     if (c == ':' || c == '=') c = '-';
-  return write_problem(
-      folder, finding.genome,
-      fmt::format("fuzz-{}-{}-{}", finding.seed, backend, finding.outcome.property),
-      {{"fuzz_seed", fmt::format("{}", finding.seed)},
-       {"fuzz_property", finding.outcome.property},
-       {"fuzz_backend", finding.outcome.backend},
-       {"fuzz_reason", finding.outcome.reason}});
+  return write_problem(folder, finding.genome,
+                       fmt::format("fuzz-{}-{}-{}", finding.seed, backend, finding.outcome.property),
+                       {{"fuzz_seed", fmt::format("{}", finding.seed)},
+                        {"fuzz_property", finding.outcome.property},
+                        {"fuzz_backend", finding.outcome.backend},
+                        {"fuzz_reason", finding.outcome.reason}});
 }
 
 }  // namespace decant::fuzz

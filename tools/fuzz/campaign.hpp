@@ -24,8 +24,8 @@ inline constexpr int run_substeps = 8, run_members = 8;
 struct Property {
   const char* name;
   const char* sentence;
-  int every;         // of so many problems one is held to it, by its seed
-  bool of_backend;   // else of the scene alone
+  int every;        // of so many problems one is held to it, by its seed
+  bool of_backend;  // else of the scene alone
 };
 const std::vector<Property>& properties();
 
@@ -33,9 +33,9 @@ const std::vector<Property>& properties();
 struct Outcome {
   std::string backend, property;
   bool holds = true;
-  double score = 0;      // largest |error| / tolerance; 0 where the property is yes or no
-  std::string field;     // and what it is of
-  std::string reason;    // in words, where it does not hold
+  double score = 0;    // largest |error| / tolerance; 0 where the property is yes or no
+  std::string field;   // and what it is of
+  std::string reason;  // in words, where it does not hold
 };
 
 /// Makes the backend of a choice on the command line.
@@ -55,8 +55,7 @@ class Tester {
   Outcome test_one(const Genome& genome, std::uint64_t seed, const Outcome& like);
 
  private:
-  std::vector<Outcome> outcomes(const Fixture& problem, std::uint64_t seed,
-                                const std::set<std::string>& backends,
+  std::vector<Outcome> outcomes(const Fixture& problem, std::uint64_t seed, const std::set<std::string>& backends,
                                 const std::set<std::string>& wanted);
   Backend& backend(const std::string& choice);
 
@@ -70,11 +69,11 @@ class Tester {
 /// A failure and what shrinking left of it.
 struct Finding {
   std::uint64_t seed = 0;
-  Outcome outcome;             // of the shrunk problem
-  Genome genome;               // shrunk
+  Outcome outcome;  // of the shrunk problem
+  Genome genome;    // shrunk
   std::size_t found_particles = 0;
-  int tries = 0;               // problems tried while shrinking
-  std::string file;            // the fixture written; empty: none
+  int tries = 0;     // problems tried while shrinking
+  std::string file;  // the fixture written; empty: none
 };
 
 /// Fewer particles, then smaller numbers, as long as the same property of the same backend fails.
@@ -96,15 +95,15 @@ struct Settings {
   std::set<std::string> properties;
   bool every_problem = false;  // properties are asked of every problem, whosever turn it is
   std::uint64_t first_seed = 1;
-  std::int64_t cases = 1000;   // of consecutive seeds; < 0: as many as there is time for
-  double seconds = 0;          // 0: no limit
+  std::int64_t cases = 1000;  // of consecutive seeds; < 0: as many as there is time for
+  double seconds = 0;         // 0: no limit
   int threads = 1;
-  int most_findings = 16;      // a campaign stops here
+  int most_findings = 16;  // a campaign stops here
   int shrink_tries = 2000;
   std::filesystem::path failures;  // folder for fixtures of findings; empty: none are written
   std::function<bool()> stop;
   std::function<void(const struct Campaign&)> progress;  // now and then, from one thread at a time
-  bool one_core_each = true;   // OpenMP inside a backend is switched off
+  bool one_core_each = true;                             // OpenMP inside a backend is switched off
 };
 
 struct Campaign {
@@ -122,8 +121,7 @@ Campaign run_campaign(const Settings& settings, const BackendMaker& make);
 
 /// Writes a problem with the oracle's answer, for `decant conform`, and its scene beside it; returns the
 /// fixture's file.
-std::string write_problem(const std::filesystem::path& folder, const Genome& genome,
-                          const std::string& name,
+std::string write_problem(const std::filesystem::path& folder, const Genome& genome, const std::string& name,
                           const std::map<std::string, std::string>& provenance);
 std::string write_finding(const std::filesystem::path& folder, const Finding& finding);
 
@@ -131,7 +129,6 @@ std::string write_finding(const std::filesystem::path& folder, const Finding& fi
 std::string campaign_table(const Campaign& campaign);
 
 /// Layout in oracle/formats/fuzz.md.
-void write_campaign(const std::filesystem::path& file, const Campaign& campaign,
-                    const BackendInfo& backend);
+void write_campaign(const std::filesystem::path& file, const Campaign& campaign, const BackendInfo& backend);
 
 }  // namespace decant::fuzz

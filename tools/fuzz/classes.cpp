@@ -114,8 +114,7 @@ std::string describe(const Genome& g) {
   if (g.mass) text += fmt::format(", mass ratio {:.2f}", (100 + g.mass) / 100.0);
   if (g.rest_density) text += fmt::format(", rest density {}", 1000 + 100 * g.rest_density);
   if (g.sound_speed) text += fmt::format(", c0 = {} m/s", 10 + g.sound_speed);
-  if (g.gravity == std::array<int, 3>{})
-    text += ", no gravity";
+  if (g.gravity == std::array<int, 3>{}) text += ", no gravity";
   else if (g.gravity != Genome{}.gravity)
     text += fmt::format(", gravity ({:.2f}, {:.2f}, {:.2f})", g.gravity[0] / 100.0, g.gravity[1] / 100.0,
                         g.gravity[2] / 100.0);

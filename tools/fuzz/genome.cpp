@@ -20,9 +20,7 @@ class Dice {
     return z ^ z >> 31;
   }
   /// low … high, both included.
-  int whole(int low, int high) {
-    return low + static_cast<int>(next() % static_cast<std::uint64_t>(high - low + 1));
-  }
+  int whole(int low, int high) { return low + static_cast<int>(next() % static_cast<std::uint64_t>(high - low + 1)); }
   bool in(int hundredths) { return whole(0, 99) < hundredths; }
 
  private:
@@ -88,8 +86,7 @@ class Scattering {
           if (!dice_.in(filled)) continue;
           Point p = anywhere(size);
           const std::array<int, 3> cell = {i, j, k};
-          for (std::size_t a = 0; a < 3; ++a)
-            p.x[a] = fine * cell[a] + fine / 2 + dice_.whole(-jitter, jitter);
+          for (std::size_t a = 0; a < 3; ++a) p.x[a] = fine * cell[a] + fine / 2 + dice_.whole(-jitter, jitter);
           g_.points.push_back(p);
         }
   }
@@ -119,8 +116,7 @@ class Scattering {
       case Kind::coincident:
         scatter(dice_.whole(20, volume / 2), size);
         for (int k = dice_.whole(1, 6); k > 0; --k) {
-          Point twin =
-              g_.points[static_cast<std::size_t>(dice_.whole(0, static_cast<int>(g_.points.size()) - 1))];
+          Point twin = g_.points[static_cast<std::size_t>(dice_.whole(0, static_cast<int>(g_.points.size()) - 1))];
           twin.v = anywhere(size).v;
           g_.points.push_back(twin);
         }
@@ -138,8 +134,7 @@ class Scattering {
         for (int k = dice_.whole(1, 5); k > 0; --k) {
           Point p = anywhere(size);
           for (std::size_t a = 0; a < 3; ++a)
-            if (!g_.periodic[a])
-              p.x[a] += (dice_.in(50) ? -1 : 1) * fine * dice_.whole(12, 1 << dice_.whole(4, 10));
+            if (!g_.periodic[a]) p.x[a] += (dice_.in(50) ? -1 : 1) * fine * dice_.whole(12, 1 << dice_.whole(4, 10));
           g_.points.push_back(p);
         }
         break;
@@ -189,7 +184,8 @@ void draw_translation(Dice& dice, Vessel& v, const std::array<int, 3>& along) {
 
 Vessel draw_vessel(Dice& dice, bool revolved, int smallest, int largest) {
   Vessel v;
-  v.form = static_cast<Form>(revolved ? dice.whole(3, 6) : std::array{0, 0, 1, 2}[static_cast<std::size_t>(dice.whole(0, 3))]);
+  v.form = static_cast<Form>(revolved ? dice.whole(3, 6)
+                                      : std::array{0, 0, 1, 2}[static_cast<std::size_t>(dice.whole(0, 3))]);
   if (v.form == Form::plug && dice.in(50)) v.form = Form::cup;
   for (int& s : v.size) s = dice.whole(smallest, largest);
   if (dice.in(30)) v.belt = draw_vector(dice, 8);
@@ -210,8 +206,7 @@ void draw_vessels(Dice& dice, Genome& g) {
   if (repeats && !revolved) {
     for (std::size_t a = 0; a < 3; ++a)
       if (g.periodic[a]) g.vessels[0].size[a] = period(dice, g, g.vessels[0].size[a]);
-    if (dice.in(20))
-      draw_translation(dice, g.vessels[0], {1 - g.periodic[0], 1 - g.periodic[1], 1 - g.periodic[2]});
+    if (dice.in(20)) draw_translation(dice, g.vessels[0], {1 - g.periodic[0], 1 - g.periodic[1], 1 - g.periodic[2]});
     return;
   }
   for (int more = dice.in(25) ? dice.in(30) ? 2 : 1 : 0; more > 0; --more) {
@@ -236,8 +231,8 @@ Genome random_genome(std::uint64_t seed) {
   const Kind kind = kind_of(dice);
   g.kernel = dice.whole(0, 2);
   // H is a whole number of lattice points for three ratios only.
-  g.support = kind == Kind::cell_faces ? std::array{4, 9, 14}[static_cast<std::size_t>(dice.whole(0, 2))]
-                                       : dice.whole(2, 12);
+  g.support =
+      kind == Kind::cell_faces ? std::array{4, 9, 14}[static_cast<std::size_t>(dice.whole(0, 2))] : dice.whole(2, 12);
   if (dice.in(50)) g.mass = dice.whole(-20, 20);
   if (dice.in(50)) g.rest_density = dice.whole(-9, 126);
   if (dice.in(50)) g.sound_speed = dice.whole(-8, 40);

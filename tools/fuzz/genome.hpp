@@ -24,7 +24,7 @@ struct Point {
 
 /// What a container is made of: boxes, then solids of revolution.
 enum class Form { tank, open_tank, steps, cup, bowl, hourglass, plug };
-inline constexpr std::array<const char*, 7> form_names = {"tank", "open tank", "steps",    "cup",
+inline constexpr std::array<const char*, 7> form_names = {"tank", "open tank", "steps", "cup",
                                                           "bowl", "hourglass", "plug"};
 constexpr bool is_revolved(Form form) { return form >= Form::cup; }
 
@@ -37,15 +37,15 @@ struct TiltStep {
 
 /// A key of a translation schedule after the first.
 struct TranslationStep {
-  int substeps = 1;             // after the key before it, 1 …
-  std::array<int, 3> speed{};   // at its fastest, c0/256, −24 … 24
+  int substeps = 1;            // after the key before it, 1 …
+  std::array<int, 3> speed{};  // at its fastest, c0/256, −24 … 24
   bool operator==(const TranslationStep&) const = default;
 };
 
 /// An oscillation.
 struct Oscillating {
-  std::array<int, 3> speed{};   // at its fastest, c0/256; of a tilt the first alone, of the farthest point
-  int period = 40, phase = 0;   // substeps, eighths of a radian
+  std::array<int, 3> speed{};  // at its fastest, c0/256; of a tilt the first alone, of the farthest point
+  int period = 40, phase = 0;  // substeps, eighths of a radian
   bool operator==(const Oscillating&) const = default;
   bool any() const { return speed != std::array<int, 3>{}; }
 };
@@ -58,46 +58,46 @@ struct Vessel {
   // how far it is shifted across, in dx.
   int side = 0, gap = 0;
   std::array<int, 2> shift{};
-  int tilts = 0;                      // 1: it has a tilt schedule
+  int tilts = 0;  // 1: it has a tilt schedule
   std::array<int, 3> axis = {0, 1, 0};
-  std::array<int, 3> pivot{};         // from the middle of its room, in dx
-  int angle = 0;                      // of the first key, eighths of a radian, −16 … 16
-  int start = 0;                      // of the first key, substeps from the state's
-  std::vector<TiltStep> steps;        // the keys after it
-  int rate = 0;                       // after the last, as a step's speed
+  std::array<int, 3> pivot{};   // from the middle of its room, in dx
+  int angle = 0;                // of the first key, eighths of a radian, −16 … 16
+  int start = 0;                // of the first key, substeps from the state's
+  std::vector<TiltStep> steps;  // the keys after it
+  int rate = 0;                 // after the last, as a step's speed
   Oscillating tilt_oscillation;
-  int translates = 0;                 // 1: it has a translation schedule
-  int translation_start = 0;          // of the first key, substeps from the state's
+  int translates = 0;         // 1: it has a translation schedule
+  int translation_start = 0;  // of the first key, substeps from the state's
   std::vector<TranslationStep> translation_steps;
-  std::array<int, 3> velocity{};      // after the last key, c0/256
+  std::array<int, 3> velocity{};  // after the last key, c0/256
   Oscillating translation_oscillation;
   bool operator==(const Vessel&) const = default;
 };
 
 struct Genome {
-  int kernel = 0;                // KernelFamily
-  int support = 4;               // H = (1.6 + support/10) dx, 0 … 14
-  int mass = 0;                  // m = (1 + mass/100) rho0 dx³
-  int rest_density = 0;          // 1000 + 100 · rest_density kg/m³, −9 …
-  int sound_speed = 0;           // 10 + sound_speed m/s, −8 …
-  int linear_state = 0;          // 1: exponent of the equation of state 1, else 7
-  int tension = 0;               // 1: pressure may be negative
-  int viscosity = 0, wall_viscosity = 0;  // hundredths of Pa·s
+  int kernel = 0;                             // KernelFamily
+  int support = 4;                            // H = (1.6 + support/10) dx, 0 … 14
+  int mass = 0;                               // m = (1 + mass/100) rho0 dx³
+  int rest_density = 0;                       // 1000 + 100 · rest_density kg/m³, −9 …
+  int sound_speed = 0;                        // 10 + sound_speed m/s, −8 …
+  int linear_state = 0;                       // 1: exponent of the equation of state 1, else 7
+  int tension = 0;                            // 1: pressure may be negative
+  int viscosity = 0, wall_viscosity = 0;      // hundredths of Pa·s
   std::array<int, 3> gravity = {0, 0, -981};  // cm/s²
-  int restitution = 0, friction = 0;      // tenths
-  int contact = 0;                        // distance ratio (5 + contact)/20, −5 … 5
-  int scale = 0;                 // dx = 2^(scale − 8) m, −2 … 4
-  std::array<int, 3> offset{};   // of the whole scene, in 64 dx · 2^far
-  int far = 0;                   // 0 … 4
-  std::array<int, 3> size = {5, 5, 5};    // of the room where no container is, in dx, 4 … 12
-  std::array<int, 3> periodic{};          // 1: the domain repeats along the axis
-  int layers = 2;                         // of wall particles
-  int floor = 0;                          // 1: there is one, below the containers or through the lowest fluid
-  int floor_gap = 0;                      // below the containers, dx/16
+  int restitution = 0, friction = 0;          // tenths
+  int contact = 0;                            // distance ratio (5 + contact)/20, −5 … 5
+  int scale = 0;                              // dx = 2^(scale − 8) m, −2 … 4
+  std::array<int, 3> offset{};                // of the whole scene, in 64 dx · 2^far
+  int far = 0;                                // 0 … 4
+  std::array<int, 3> size = {5, 5, 5};        // of the room where no container is, in dx, 4 … 12
+  std::array<int, 3> periodic{};              // 1: the domain repeats along the axis
+  int layers = 2;                             // of wall particles
+  int floor = 0;                              // 1: there is one, below the containers or through the lowest fluid
+  int floor_gap = 0;                          // below the containers, dx/16
   std::vector<Vessel> vessels;
-  int reversed = 0;              // 1: the scene lists its containers from the last on
-  int substep = 0;               // of the state, 0 … 999
-  int courant = 4;               // tenths, 1 … 4
+  int reversed = 0;  // 1: the scene lists its containers from the last on
+  int substep = 0;   // of the state, 0 … 999
+  int courant = 4;   // tenths, 1 … 4
   int frames = 1;
   std::vector<Point> points;
 
@@ -117,12 +117,30 @@ Genome random_genome(std::uint64_t seed);
 Fixture problem_of(const Genome& genome, const std::string& name);
 
 /// What a problem has that ports trip over, by name, in this order.
-inline constexpr std::array<const char*, 24> class_names = {
-    "walls",          "moving wall",   "belt",         "contact",  "periodic",
-    "far away",       "isolated",      "crowded",      "coincident", "on cell faces",
-    "outlier",        "negative side", "tension",      "floor",        "one or none",
-    "tilted box",     "translating wall",  "tilt of three keys",  "slanted outline",   "several containers",
-    "at wall and floor",  "periods that differ",  "calibrated mass",  "gravity not down"};
+inline constexpr std::array<const char*, 24> class_names = {"walls",
+                                                            "moving wall",
+                                                            "belt",
+                                                            "contact",
+                                                            "periodic",
+                                                            "far away",
+                                                            "isolated",
+                                                            "crowded",
+                                                            "coincident",
+                                                            "on cell faces",
+                                                            "outlier",
+                                                            "negative side",
+                                                            "tension",
+                                                            "floor",
+                                                            "one or none",
+                                                            "tilted box",
+                                                            "translating wall",
+                                                            "tilt of three keys",
+                                                            "slanted outline",
+                                                            "several containers",
+                                                            "at wall and floor",
+                                                            "periods that differ",
+                                                            "calibrated mass",
+                                                            "gravity not down"};
 using Classes = std::array<bool, class_names.size()>;
 Classes classes_of(const Fixture& fixture);
 

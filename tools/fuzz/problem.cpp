@@ -87,8 +87,8 @@ Translation translation_of(const Genome& g, const Vessel& v, double sound_speed,
   }
   t.velocity = sound_speed / 256 * real(v.velocity);
   if (v.translation_oscillation.any())
-    t.oscillation = oscillation_of<Vec3>(v.translation_oscillation,
-                                         sound_speed / 256 * real(v.translation_oscillation.speed), dt);
+    t.oscillation =
+        oscillation_of<Vec3>(v.translation_oscillation, sound_speed / 256 * real(v.translation_oscillation.speed), dt);
   return t;
 }
 
@@ -147,8 +147,7 @@ Container container_of(const Genome& g, const Vessel& v, std::size_t k, const Sc
   }
   tilt.rate = v.rate * unit;
   if (v.tilt_oscillation.any())
-    tilt.oscillation =
-        oscillation_of<double>(v.tilt_oscillation, v.tilt_oscillation.speed[0] * unit, dt);
+    tilt.oscillation = oscillation_of<double>(v.tilt_oscillation, v.tilt_oscillation.speed[0] * unit, dt);
   const Eigen::AngleAxisd turned(tilt_at(tilt, now).angle, tilt.axis);
   c.origin = tilt.pivot + turned.inverse() * (start - turned * local_middle - tilt.pivot);
   c.tilt = tilt;
@@ -218,8 +217,7 @@ Fill fill_of(const Scene& scene, const Vec3& middle) {
   Vec3 at = middle;
   bool aside = false;
   for (Eigen::Index a = 0; a < 3; ++a) {
-    if (scene.domain.periodic[static_cast<std::size_t>(a)])
-      at[a] = scene.domain.min[a] + dx;
+    if (scene.domain.periodic[static_cast<std::size_t>(a)]) at[a] = scene.domain.min[a] + dx;
     else if (!aside) {
       at[a] = scene.domain.max[a] - 2 * dx;
       aside = true;

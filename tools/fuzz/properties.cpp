@@ -21,25 +21,22 @@ namespace decant::fuzz {
 namespace {
 
 /// The checks of `conform` that are properties as they are.
-const std::set<std::string> checked = {"fields",      "substep",      "contact",     "advanced",
-                                       "trajectory",  "mass",         "containment", "conservation",
-                                       "determinism", "invariance",   "status"};
+const std::set<std::string> checked = {"fields",      "substep",      "contact",     "advanced",   "trajectory", "mass",
+                                       "containment", "conservation", "determinism", "invariance", "status"};
 
 Outcome failed(const std::string& backend, const char* property, std::string reason) {
   return {backend, property, false, 0, "", std::move(reason)};
 }
 
 /// Those that run more than one substep.
-constexpr std::array runs = {"advanced",    "trajectory",  "sequence",    "mass",
-                             "containment", "determinism", "lists"};
+constexpr std::array runs = {"advanced", "trajectory", "sequence", "mass", "containment", "determinism", "lists"};
 
 /// Those that hold where every substep is what the oracle makes of the state before it: where fp32 cannot
 /// tell to which of two faces a particle is pushed, runs part for good, and two may end in one corner.
 const std::set<std::string> follow_from_steps = {"trajectory", "mass", "containment"};
 
 /// The property's rows, joined to the worst.
-Outcome joined(const std::string& backend, const std::string& property,
-               const std::vector<CheckRow>& rows) {
+Outcome joined(const std::string& backend, const std::string& property, const std::vector<CheckRow>& rows) {
   // `fields` gives rows of several names.
   Outcome o{backend, property, true, 0, "", ""};
   for (const CheckRow& row : rows) {
@@ -50,8 +47,7 @@ Outcome joined(const std::string& backend, const std::string& property,
     if (fails && row.excluded > 0 && (row.n == 0 || row.score <= 1)) continue;
     if (fails && (o.holds || !(row.score <= o.score)))
       o.reason = fmt::format("{} {}: {}", row.check, row.field,
-                             row.reason.empty() ? fmt::format("score {:.3g}", row.score)
-                                                : row.reason);
+                             row.reason.empty() ? fmt::format("score {:.3g}", row.score) : row.reason);
     if (!(row.score <= o.score) || (fails && o.holds)) {
       o.score = row.score;
       o.field = row.check + (row.field.empty() ? "" : " " + row.field);
@@ -63,11 +59,10 @@ Outcome joined(const std::string& backend, const std::string& property,
 
 /// The state after the first `substeps` of a run in parts. After a part either fields are evaluated or the
 /// state is loaded anew, by turns, where the run is `interrupted`.
-ParticleState state_after(Backend& backend, const Fixture& f, const Walls& walls,
-                          const std::vector<int>& parts, bool interrupted, int substeps) {
+ParticleState state_after(Backend& backend, const Fixture& f, const Walls& walls, const std::vector<int>& parts,
+                          bool interrupted, int substeps) {
   const auto advance = [&](int count) {
-    if (const Status status = backend.advance(count); !status.ok())
-      throw BackendError(describe(status));
+    if (const Status status = backend.advance(count); !status.ok()) throw BackendError(describe(status));
   };
   backend.load(f.scene, walls, f.state);
   ParticleState state = f.state;
@@ -78,8 +73,7 @@ ParticleState state_after(Backend& backend, const Fixture& f, const Walls& walls
     if (!interrupted || substeps <= 0) continue;
     if (k % 2 == 0) {
       Fields fields = Fields::unwritten(f.state.size(), walls.size());
-      if (const Status status = backend.evaluate(fields); !status.ok())
-        throw BackendError(describe(status));
+      if (const Status status = backend.evaluate(fields); !status.ok()) throw BackendError(describe(status));
     } else {
       backend.load(f.scene, walls, state);
     }
@@ -89,8 +83,8 @@ ParticleState state_after(Backend& backend, const Fixture& f, const Walls& walls
 
 /// Whether every substep of a run is what the oracle makes of the state before it. Contact is a
 /// discontinuity: a run may leave every bound and be right at each step.
-bool each_step_holds(Backend& backend, const Fixture& f, const Walls& walls,
-                     const std::vector<int>& parts, bool interrupted) {
+bool each_step_holds(Backend& backend, const Fixture& f, const Walls& walls, const std::vector<int>& parts,
+                     bool interrupted) {
   Fixture now = f;
   for (int k = 1; k <= run_substeps; ++k) {
     const Judgement oracle = prepare(now, {"substep"});
@@ -110,15 +104,13 @@ bool each_step_holds(Backend& backend, const Fixture& f, const Walls& walls,
 
 /// Whether a run in unequal parts, with looks and loads in between, ends where one in one piece does, as
 /// near as runs disturbed by rounding do.
-Outcome sequence(Backend& backend, const std::string& name, const Fixture& f, const Walls& walls,
-                 std::uint64_t seed) {
+Outcome sequence(Backend& backend, const std::string& name, const Fixture& f, const Walls& walls, std::uint64_t seed) {
   const int a = 1 + static_cast<int>(seed / 8 % 3), b = 1 + static_cast<int>(seed / 24 % 3);
   const std::vector<int> plan = {a, b, run_substeps - a - b};
   const ParticleState whole = state_after(backend, f, walls, {run_substeps}, false, run_substeps),
                       parts = state_after(backend, f, walls, plan, true, run_substeps);
   if (parts.substep != whole.substep)
-    return failed(name, "sequence",
-                  fmt::format("at substep {} instead of {}", parts.substep, whole.substep));
+    return failed(name, "sequence", fmt::format("at substep {} instead of {}", parts.substep, whole.substep));
   const Divergence apart = divergence(f.scene, parts, whole), bound = divergence_bound(f.ensemble);
   Outcome o{name, "sequence", true, 0, "", ""};
   for (std::size_t k = 0; k < apart.size(); ++k) {
@@ -151,8 +143,7 @@ Outcome lists(Backend& backend, const std::string& name, const Fixture& f, const
   if (status.bits & Status::missed_pair) return failed(name, "lists", describe(status));
   const PairTotals counted = backend.neighbor_stats().verified;
   if (counted.missed + counted.wall_missed == 0) return {name, "lists", true, 0, "", ""};
-  return failed(name, "lists",
-                fmt::format("{} and {} of walls missed", counted.missed, counted.wall_missed));
+  return failed(name, "lists", fmt::format("{} and {} of walls missed", counted.missed, counted.wall_missed));
 }
 
 /// Whether the scene comes back from its file as it was.
@@ -193,8 +184,7 @@ Outcome refusal(const Scene& scene, std::uint64_t seed) {
   } catch (const InputError& error) {
     if (error.key().find(key) != std::string::npos || error.key().find("surprise") != std::string::npos)
       return {"scene", "refusal", true, 0, "", ""};
-    return failed("scene", "refusal",
-                  fmt::format("'{}' is wrong, '{}' was named", key, error.key()));
+    return failed("scene", "refusal", fmt::format("'{}' is wrong, '{}' was named", key, error.key()));
   }
   return failed("scene", "refusal", fmt::format("'{}' is wrong and nothing was said", key));
 }
@@ -212,8 +202,7 @@ const std::vector<Property>& properties() {
       {"containment", "no particle gets deeper into a wall than the oracle's own run shows", 4, true},
       {"determinism", "the same again gives the same bits", 4, true},
       {"invariance", "ids permuted, everything moved, everything turned: the same answer", 4, true},
-      {"trajectory", "a short run ends where the oracle's ends, as near as rounding lets runs end", 8,
-       true},
+      {"trajectory", "a short run ends where the oracle's ends, as near as rounding lets runs end", 8, true},
       {"status", "trouble that is made is reported, with its particle and substep", 8, true},
       {"sequence", "parts of a run, looks and loads in between, end where one run ends", 8, true},
       {"lists", "a list that rebuilds by displacement misses no pair at any substep", 4, true},
@@ -223,8 +212,8 @@ const std::vector<Property>& properties() {
   return all;
 }
 
-Tester::Tester(std::vector<std::string> backends, std::set<std::string> properties,
-               BackendMaker make, bool every_problem)
+Tester::Tester(std::vector<std::string> backends, std::set<std::string> properties, BackendMaker make,
+               bool every_problem)
     : names_(std::move(backends)),
       properties_(std::move(properties)),
       make_(std::move(make)),
@@ -246,14 +235,12 @@ std::vector<Outcome> Tester::test(const Fixture& problem, std::uint64_t seed) {
 }
 
 Outcome Tester::test_one(const Genome& genome, std::uint64_t seed, const Outcome& like) {
-  for (Outcome& o : outcomes(problem_of(genome, fmt::format("fuzz-{}", seed)), seed, {like.backend},
-                             {like.property}))
+  for (Outcome& o : outcomes(problem_of(genome, fmt::format("fuzz-{}", seed)), seed, {like.backend}, {like.property}))
     if (o.backend == like.backend && o.property == like.property) return o;
   return {like.backend, like.property, true, 0, "", ""};
 }
 
-std::vector<Outcome> Tester::outcomes(const Fixture& problem, std::uint64_t seed,
-                                      const std::set<std::string>& backends,
+std::vector<Outcome> Tester::outcomes(const Fixture& problem, std::uint64_t seed, const std::set<std::string>& backends,
                                       const std::set<std::string>& asked) {
   std::vector<Outcome> all;
   std::set<std::string> wanted = asked;
@@ -279,8 +266,7 @@ std::vector<Outcome> Tester::outcomes(const Fixture& problem, std::uint64_t seed
   };
   CheckSelection checks = chosen_checks();
   // Looks ahead: where the oracle's own run bursts out of the domain, nothing is asked of runs.
-  if (wanted.contains("sequence") || wanted.contains("lists") || wanted.contains("advanced"))
-    checks.insert("mass");
+  if (wanted.contains("sequence") || wanted.contains("lists") || wanted.contains("advanced")) checks.insert("mass");
   const Judgement oracle = prepare(fixture, checks);
   if (!weakness(oracle.own).empty()) return {};
   const Scene& scene = fixture.scene;
@@ -304,19 +290,15 @@ std::vector<Outcome> Tester::outcomes(const Fixture& problem, std::uint64_t seed
         trouble = error.what();
       }
       for (const auto& property : checks) {
-        Outcome o = trouble.empty() ? joined(name, property, rows)
-                                    : failed(name, property.c_str(), trouble);
+        Outcome o = trouble.empty() ? joined(name, property, rows) : failed(name, property.c_str(), trouble);
         if (follow_from_steps.contains(property) && !o.holds && trouble.empty())
           o.holds = each_step_holds(backend(name), fixture, oracle.walls, {run_substeps}, false);
         all.push_back(std::move(o));
       }
     }
-    ask(name, "sequence",
-        [&] { return sequence(backend(name), name, fixture, oracle.walls, seed); });
+    ask(name, "sequence", [&] { return sequence(backend(name), name, fixture, oracle.walls, seed); });
     if (name.starts_with("list") && name.find("rebuild=") == std::string::npos)
-      ask(name, "lists", [&] {
-        return lists(backend(name + ":check_completeness=on"), name, fixture, oracle.walls);
-      });
+      ask(name, "lists", [&] { return lists(backend(name + ":check_completeness=on"), name, fixture, oracle.walls); });
   }
   return all;
 }

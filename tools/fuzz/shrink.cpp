@@ -17,8 +17,7 @@ class Shrinking {
       : tester_(tester),
         best_(std::move(found)),
         most_(most_tries),
-        end_(Clock::now() + std::chrono::duration_cast<Clock::duration>(
-                                std::chrono::duration<double>(seconds))) {}
+        end_(Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds))) {}
 
   Finding run() {
     best_.found_particles = best_.genome.points.size();
@@ -53,8 +52,7 @@ class Shrinking {
   }
 
   void drop_particles() {
-    for (std::size_t chunk = std::max<std::size_t>(best_.genome.points.size() / 2, 1); chunk > 0;
-         chunk /= 2)
+    for (std::size_t chunk = std::max<std::size_t>(best_.genome.points.size() / 2, 1); chunk > 0; chunk /= 2)
       for (std::size_t from = 0; from < best_.genome.points.size();) {
         Genome fewer = best_.genome;
         const auto first = fewer.points.begin() + static_cast<std::ptrdiff_t>(from);
@@ -76,16 +74,17 @@ class Shrinking {
     if (g.vessels.size() == 1) g.size = g.vessels[0].size;
     g.vessels.erase(g.vessels.begin() + static_cast<std::ptrdiff_t>(k));
     const int room = static_cast<int>(k);
-    for (Point& p : g.points)
-      p.room = p.room == room ? 0 : p.room - (p.room > room);
+    for (Point& p : g.points) p.room = p.room == room ? 0 : p.room - (p.room > room);
   }
 
   void drop_vessels() {
-    for (std::size_t k = best_.genome.vessels.size(); k-- > 0;)
-      attempt([k](Genome& g) { drop_vessel(g, k); });
+    for (std::size_t k = best_.genome.vessels.size(); k-- > 0;) attempt([k](Genome& g) { drop_vessel(g, k); });
     for (std::size_t k = 0; k < best_.genome.vessels.size(); ++k) {
       const auto of = [k](auto change) { return [k, change](Genome& g) { change(g.vessels[k]); }; };
-      attempt(of([](Vessel& v) { v.tilts = 0; v.steps = {}; }));
+      attempt(of([](Vessel& v) {
+        v.tilts = 0;
+        v.steps = {};
+      }));
       attempt(of([](Vessel& v) { v.steps = {}; }));
       for (std::size_t last = best_.genome.vessels[k].steps.size(); last-- > 0;)
         attempt(of([last](Vessel& v) { v.steps.erase(v.steps.begin() + static_cast<std::ptrdiff_t>(last)); }));
@@ -103,38 +102,34 @@ class Shrinking {
       attempt(of([](Vessel& v) { v.belt = {}; }));
       attempt(of([](Vessel& v) { v.pivot = {}; }));
       attempt(of([](Vessel& v) { v.axis = {0, 1, 0}; }));
-      for (int Vessel::*number : {&Vessel::angle, &Vessel::start, &Vessel::gap, &Vessel::side})
+      for (int Vessel::* number : {&Vessel::angle, &Vessel::start, &Vessel::gap, &Vessel::side})
         attempt(of([number](Vessel& v) { v.*number = 0; }));
       attempt(of([](Vessel& v) { v.shift = {}; }));
       attempt(of([](Vessel& v) { v.form = is_revolved(v.form) ? Form::cup : Form::tank; }));
-      for (std::size_t a = 0; a < 3; ++a)
-        attempt(of([a](Vessel& v) { v.size[a] = 5; }));
+      for (std::size_t a = 0; a < 3; ++a) attempt(of([a](Vessel& v) { v.size[a] = 5; }));
     }
   }
 
   void make_plain() {
     drop_vessels();
     attempt([](Genome& g) { g.periodic = {}; });
-    for (std::size_t a = 0; a < 3; ++a)
-      attempt([a](Genome& g) { g.periodic[a] = 0; });
+    for (std::size_t a = 0; a < 3; ++a) attempt([a](Genome& g) { g.periodic[a] = 0; });
     attempt([](Genome& g) {
       g.offset = {};
       g.far = 0;
     });
     attempt([](Genome& g) { g.far = 0; });
-    for (int Genome::*number :
-         {&Genome::floor, &Genome::floor_gap, &Genome::reversed, &Genome::mass, &Genome::rest_density,
-          &Genome::sound_speed, &Genome::substep, &Genome::friction, &Genome::restitution, &Genome::contact,
-          &Genome::tension, &Genome::linear_state, &Genome::viscosity, &Genome::wall_viscosity,
-          &Genome::kernel, &Genome::scale})
+    for (int Genome::* number : {&Genome::floor, &Genome::floor_gap, &Genome::reversed, &Genome::mass,
+                                 &Genome::rest_density, &Genome::sound_speed, &Genome::substep, &Genome::friction,
+                                 &Genome::restitution, &Genome::contact, &Genome::tension, &Genome::linear_state,
+                                 &Genome::viscosity, &Genome::wall_viscosity, &Genome::kernel, &Genome::scale})
       attempt([number](Genome& g) { g.*number = 0; });
     attempt([](Genome& g) { g.gravity = Genome{}.gravity; });
     attempt([](Genome& g) { g.support = 4; });
     attempt([](Genome& g) { g.layers = 1; });
     attempt([](Genome& g) { g.courant = 4; });
     attempt([](Genome& g) { g.frames = 1; });
-    for (std::size_t a = 0; a < 3; ++a)
-      attempt([a](Genome& g) { g.size[a] = 5; });
+    for (std::size_t a = 0; a < 3; ++a) attempt([a](Genome& g) { g.size[a] = 5; });
     attempt([](Genome& g) {
       for (Point& p : g.points) p.v = {};
     });

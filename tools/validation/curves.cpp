@@ -45,10 +45,8 @@ Curve read_curve(const std::filesystem::path& file) {
                        "two finite numbers with a comma between them");
     points.emplace_back(x, y);
   }
-  if (points.size() < 2)
-    throw InputError(file.string(), "points", std::to_string(points.size()), "at least 2");
-  std::stable_sort(points.begin(), points.end(),
-                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  if (points.size() < 2) throw InputError(file.string(), "points", std::to_string(points.size()), "at least 2");
+  std::stable_sort(points.begin(), points.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   Curve curve;
   for (const auto& [x, y] : points) {
     curve.x.push_back(x);

@@ -27,7 +27,10 @@ Vec3 column_of(const Scene& scene) {
 class DamFront : public CaseObserver {
  public:
   explicit DamFront(const CaseInputs& inputs)
-      : scene_(inputs.scene), a_(column_of(inputs.scene).x()), width_(column_of(inputs.scene).y()), folder_(inputs.experiments) {}
+      : scene_(inputs.scene),
+        a_(column_of(inputs.scene).x()),
+        width_(column_of(inputs.scene).y()),
+        folder_(inputs.experiments) {}
 
   void look(const Moment& moment) override {
     const double dx = scene_.particle_spacing;
@@ -51,8 +54,7 @@ class DamFront : public CaseObserver {
     // Coarser than 20 spacings to the column's width the gates do not apply.
     const double gate = a_ >= 19.99 * scene_.particle_spacing ? 0.10 : NAN;
     const double measured = slope(front, 1.4, 3.1), found = slope(front_, 1.4, 3.1);
-    result.add({"front speed dZ/dT, T 1.4-3.1", "1", measured, found,
-                std::abs(found / measured - 1), gate});
+    result.add({"front speed dZ/dT, T 1.4-3.1", "1", measured, found, std::abs(found / measured - 1), gate});
     const auto worst = [](const Curve& reference, const Curve& simulated, double from, double to) {
       double largest = 0, at = NAN, is = NAN;
       for (std::size_t k = 0; k < reference.x.size(); ++k) {
@@ -73,16 +75,15 @@ class DamFront : public CaseObserver {
     result.add({"front Z, T 0.8-1.4, worst", "a", early[0], early[1], early[2]});
     const auto fallen = worst(height, height_, 0, 3);
     result.add({"height, tau <= 3, worst", "2a", fallen[0], fallen[1], fallen[2]});
-    const auto curve = [&](const char* panel, const std::string& name, const char* x,
-                           const char* y, bool reference, const Curve& points) {
+    const auto curve = [&](const char* panel, const std::string& name, const char* x, const char* y, bool reference,
+                           const Curve& points) {
       result.curves.push_back({panel, name, x, "1", y, "1", reference, points.x, points.y});
     };
     const char *T = "T = t √(2g/a)", *Z = "Z = x / a", *tau = "τ = t √(g/a)", *H = "height / 2a";
     curve("front", "Martin & Moyce 1952, a = 2.25 in", T, Z, true, front);
     curve("front", "the same, n² = 2, a = 1.125 in", T, Z, true,
           read_curve(folder_ / "martin_moyce_n2sq2_a1.125in.csv"));
-    curve("front", "Koshizuka & Oka 1996", T, Z, true,
-          read_curve(folder_ / "koshizuka_oka_1996_pysph.csv"));
+    curve("front", "Koshizuka & Oka 1996", T, Z, true, read_curve(folder_ / "koshizuka_oka_1996_pysph.csv"));
     // Given in seconds and metres for a = 1 m.
     Curve second = read_curve(folder_ / "koshizuka_oka_1996_dualsphysics_L1m.csv");
     for (double& t : second.x) t *= std::sqrt(2 * 9.81);
@@ -110,8 +111,7 @@ struct Probe {
 class Impact : public CaseObserver {
  public:
   /// \param face  x of the surface that is hit, m; \param direction  +1 where the wave runs along +x
-  Impact(const CaseInputs& inputs, double face, int direction, double y_min, double y_max,
-         std::vector<Probe> probes)
+  Impact(const CaseInputs& inputs, double face, int direction, double y_min, double y_max, std::vector<Probe> probes)
       : scene_(inputs.scene),
         folder_(inputs.experiments),
         height_(column_of(inputs.scene).z()),
@@ -142,26 +142,23 @@ class Impact : public CaseObserver {
       const Probe& probe = probes_[k];
       const Curve measured = read_curve(folder_ / probe.file);
       const double highest = *std::max_element(measured.y.begin(), measured.y.end());
-      const double arrival = first_reach(measured, 0.25 * highest),
-                   arrived = first_reach(found_[k], 0.25 * highest);
+      const double arrival = first_reach(measured, 0.25 * highest), arrived = first_reach(found_[k], 0.25 * highest);
       // Some of the digitised points are far apart: it may have come at any time between two.
       const auto [earliest, latest] = first_reach_between(measured, 0.25 * highest);
       const double late = std::max({earliest - arrived, arrived - latest, 0.0});
       const bool gated = probe.gated && away_[k];
       const std::string name = std::string(probe.name) + ": ";
-      result.add({name + "arrival t*", "√(H/g)", arrival, arrived,
-                  std::isnan(arrived) ? NAN : late / arrival, gated ? 0.10 : NAN});
+      result.add({name + "arrival t*", "√(H/g)", arrival, arrived, std::isnan(arrived) ? NAN : late / arrival,
+                  gated ? 0.10 : NAN});
       // From a little before the wave's arrival to the end of what both have.
       const double from = arrival - 0.2, to = std::min(measured.x.back(), found_[k].x.back());
-      const double impulse = integral(measured, from, to),
-                   pushed = integral(found_[k], from, to);
-      result.add({name + "impulse ∫p* dt*", "ρgH √(H/g)", impulse, pushed,
-                  std::abs(pushed / impulse - 1), gated ? 0.15 : NAN});
+      const double impulse = integral(measured, from, to), pushed = integral(found_[k], from, to);
+      result.add({name + "impulse ∫p* dt*", "ρgH √(H/g)", impulse, pushed, std::abs(pushed / impulse - 1),
+                  gated ? 0.15 : NAN});
       const double peak = *std::max_element(found_[k].y.begin(), found_[k].y.end());
       result.add({name + "peak", "ρgH", highest, peak, std::abs(peak / highest - 1)});
       const auto curve = [&](const std::string& title, bool reference, const Curve& c) {
-        result.curves.push_back({probe.name, title, "t* = t √(g/H)", "1", "p / ρgH", "1", reference,
-                                 c.x, c.y});
+        result.curves.push_back({probe.name, title, "t* = t √(g/H)", "1", "p / ρgH", "1", reference, c.x, c.y});
       };
       curve("measured", true, measured);
       curve("simulated", false, found_[k]);
@@ -179,35 +176,29 @@ class Impact : public CaseObserver {
 };
 
 /// The cavity of the scene's only tank.
-SolidBox tank_of(const Scene& scene) {
-  return std::get<BoxShape>(scene.containers.at(0).shape).cavity;
-}
+SolidBox tank_of(const Scene& scene) { return std::get<BoxShape>(scene.containers.at(0).shape).cavity; }
 
 }  // namespace
 
-std::unique_ptr<CaseObserver> observe_dam_front(const CaseInputs& inputs) {
-  return std::make_unique<DamFront>(inputs);
-}
+std::unique_ptr<CaseObserver> observe_dam_front(const CaseInputs& inputs) { return std::make_unique<DamFront>(inputs); }
 
 std::unique_ptr<CaseObserver> observe_dam_wall(const CaseInputs& inputs) {
   const SolidBox tank = tank_of(inputs.scene);
   // Buchner's column was twice as high: his probe stands at a fifth of the column's height.
   const double H = column_of(inputs.scene).z();
-  return std::make_unique<Impact>(
-      inputs, tank.max.x(), +1, tank.min.y(), tank.max.y(),
-      std::vector<Probe>{{"Lobovský, 3 mm", "lobovsky_2014_p1.csv", 0.003, false},
-                         {"Lobovský, 30 mm", "lobovsky_2014_p3.csv", 0.030, true},
-                         {"Lobovský, 80 mm", "lobovsky_2014_p4.csv", 0.080, true},
-                         {"Buchner, 0.2 H", "buchner_2002_p.csv", 0.2 * H, true}});
+  return std::make_unique<Impact>(inputs, tank.max.x(), +1, tank.min.y(), tank.max.y(),
+                                  std::vector<Probe>{{"Lobovský, 3 mm", "lobovsky_2014_p1.csv", 0.003, false},
+                                                     {"Lobovský, 30 mm", "lobovsky_2014_p3.csv", 0.030, true},
+                                                     {"Lobovský, 80 mm", "lobovsky_2014_p4.csv", 0.080, true},
+                                                     {"Buchner, 0.2 H", "buchner_2002_p.csv", 0.2 * H, true}});
 }
 
 std::unique_ptr<CaseObserver> observe_dam_obstacle(const CaseInputs& inputs) {
   // The last solid of the list is the obstacle.
   const SolidBox box = std::get<BoxShape>(inputs.scene.containers.at(0).shape).solid.back();
-  return std::make_unique<Impact>(
-      inputs, box.max.x(), -1, box.min.y(), box.max.y(),
-      std::vector<Probe>{{"Kleefsman, P1", "kleefsman_2005_p1.csv", 0.021, true},
-                         {"Kleefsman, P3", "kleefsman_2005_p3.csv", 0.101, true}});
+  return std::make_unique<Impact>(inputs, box.max.x(), -1, box.min.y(), box.max.y(),
+                                  std::vector<Probe>{{"Kleefsman, P1", "kleefsman_2005_p1.csv", 0.021, true},
+                                                     {"Kleefsman, P3", "kleefsman_2005_p3.csv", 0.101, true}});
 }
 
 }  // namespace decant

@@ -16,8 +16,7 @@ using std::numbers::pi;
 double couette_velocity(double V, double nu, double L, double z, double t) {
   double u = V * z / L;
   for (int n = 1; n <= 200; ++n)
-    u += 2 * V / (n * pi) * (n % 2 ? -1 : 1) * std::sin(n * pi * z / L) *
-         std::exp(-n * n * pi * pi * nu * t / (L * L));
+    u += 2 * V / (n * pi) * (n % 2 ? -1 : 1) * std::sin(n * pi * z / L) * std::exp(-n * n * pi * pi * nu * t / (L * L));
   return u;
 }
 
@@ -41,8 +40,7 @@ double drop_axis(double A, double t) {
   };
   for (int k = 0; k < steps; ++k) {
     const auto k1 = rate(a, A), k2 = rate(a + 0.5 * dt * k1[0], A + 0.5 * dt * k1[1]),
-               k3 = rate(a + 0.5 * dt * k2[0], A + 0.5 * dt * k2[1]),
-               k4 = rate(a + dt * k3[0], A + dt * k3[1]);
+               k3 = rate(a + 0.5 * dt * k2[0], A + 0.5 * dt * k2[1]), k4 = rate(a + dt * k3[0], A + dt * k3[1]);
     a += dt / 6 * (k1[0] + 2 * k2[0] + 2 * k3[0] + k4[0]);
     A += dt / 6 * (k1[1] + 2 * k2[1] + 2 * k3[1] + k4[1]);
   }

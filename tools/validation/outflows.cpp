@@ -25,10 +25,8 @@ class Slit : public CaseObserver {
   }
 
   void look(const Moment& moment) override {
-    const double above =
-        static_cast<double>((moment.state.position.row(2).array() > level_).count());
-    const double h = above * scene_.particle_mass() /
-                     (scene_.fluid.rest_density * width_ * thickness_);
+    const double above = static_cast<double>((moment.state.position.row(2).array() > level_).count());
+    const double h = above * scene_.particle_mass() / (scene_.fluid.rest_density * width_ * thickness_);
     root_.x.push_back(moment.time);
     root_.y.push_back(std::sqrt(h));
   }
@@ -37,8 +35,7 @@ class Slit : public CaseObserver {
     // From where the flow has established itself to where the surface dips towards the slit.
     Curve steady;
     for (std::size_t k = 0; k < root_.x.size(); ++k)
-      if (root_.y[k] <= std::sqrt(0.85) * root_.y.front() &&
-          root_.y[k] >= std::sqrt(0.45) * root_.y.front()) {
+      if (root_.y[k] <= std::sqrt(0.85) * root_.y.front() && root_.y[k] >= std::sqrt(0.45) * root_.y.front()) {
         steady.x.push_back(root_.x[k]);
         steady.y.push_back(root_.y[k]);
       }
@@ -51,12 +48,10 @@ class Slit : public CaseObserver {
     if (!steady.x.empty())
       for (const double t : {steady.x.front(), steady.x.back()}) {
         line.x.push_back(t);
-        line.y.push_back(steady.y.front() -
-                         exact * slit_ / width_ * std::sqrt(g / 2) * (t - steady.x.front()));
+        line.y.push_back(steady.y.front() - exact * slit_ / width_ * std::sqrt(g / 2) * (t - steady.x.front()));
       }
     result.curves.push_back({"head", "simulated", "t", "s", "√h", "√m", false, root_.x, root_.y});
-    result.curves.push_back({"head", "Torricelli, C_d = 0.611", "t", "s", "√h", "√m", true, line.x,
-                             line.y});
+    result.curves.push_back({"head", "Torricelli, C_d = 0.611", "t", "s", "√h", "√m", true, line.x, line.y});
   }
 
  private:
@@ -85,8 +80,7 @@ class SlowPour : public CaseObserver {
   void look(const Moment& moment) override {
     const AuditResult audit = audit_.look(moment.state);
     volume_.x.push_back(moment.time);
-    volume_.y.push_back(audit.mass_at[static_cast<std::size_t>(Place::source)] /
-                        scene_.fluid.rest_density);
+    volume_.y.push_back(audit.mass_at[static_cast<std::size_t>(Place::source)] / scene_.fluid.rest_density);
     // Paths are not judged: between two frames a particle turns around the rim.
     inside_ += audit.inside;
   }
@@ -103,16 +97,14 @@ class SlowPour : public CaseObserver {
       // Below 20 dx, and where it is nearly empty, the residual is reported only.
       const bool gated = resolution_ >= 20 && degrees > 14.9 && degrees < 60.1;
       const std::string at = std::to_string(static_cast<int>(std::lround(degrees))) + "°";
-      result.add({"residual at " + at, "mL", 1e6 * should, 1e6 * is,
-                  std::abs(is - should) / whole, gated ? 0.04 : NAN});
+      result.add(
+          {"residual at " + at, "mL", 1e6 * should, 1e6 * is, std::abs(is - should) / whole, gated ? 0.04 : NAN});
       const double rate = -slope(volume_, end - 0.5, end) / whole;
-      result.add({"still flowing at " + at + ", share a second", "1/s", 0, rate, std::abs(rate),
-                  gated ? 0.001 : NAN});
+      result.add({"still flowing at " + at + ", share a second", "1/s", 0, rate, std::abs(rate), gated ? 0.001 : NAN});
       exact.x.insert(exact.x.end(), {keys[k - 1].time, keys[k].time, NAN});
       exact.y.insert(exact.y.end(), {1e6 * should, 1e6 * should, NAN});
     }
-    result.add({"particles seen inside a wall", "1", 0, static_cast<double>(inside_),
-                static_cast<double>(inside_), 0});
+    result.add({"particles seen inside a wall", "1", 0, static_cast<double>(inside_), static_cast<double>(inside_), 0});
     ValidationCurve found{"volume", "simulated", "t", "s", "volume", "mL", false, volume_.x, {}};
     for (const double v : volume_.y) found.y.push_back(1e6 * v);
     result.curves.push_back(std::move(exact));
@@ -130,12 +122,8 @@ class SlowPour : public CaseObserver {
 
 }  // namespace
 
-std::unique_ptr<CaseObserver> observe_slit(const CaseInputs& inputs) {
-  return std::make_unique<Slit>(inputs);
-}
+std::unique_ptr<CaseObserver> observe_slit(const CaseInputs& inputs) { return std::make_unique<Slit>(inputs); }
 
-std::unique_ptr<CaseObserver> observe_slow_pour(const CaseInputs& inputs) {
-  return std::make_unique<SlowPour>(inputs);
-}
+std::unique_ptr<CaseObserver> observe_slow_pour(const CaseInputs& inputs) { return std::make_unique<SlowPour>(inputs); }
 
 }  // namespace decant

@@ -38,9 +38,8 @@ void require_ok(const Backend& backend, const Status& status) {
 
 }  // namespace
 
-ValidationResult run_case(const ValidationCase& which, int resolution, const Scene& scene,
-                          Backend& backend, const std::filesystem::path& experiments,
-                          const std::function<void(int)>& frame_done) {
+ValidationResult run_case(const ValidationCase& which, int resolution, const Scene& scene, Backend& backend,
+                          const std::filesystem::path& experiments, const std::function<void(int)>& frame_done) {
   const Walls walls = sample_walls(scene);
   ParticleState state = initial_state(scene);
   ValidationResult result;
@@ -51,8 +50,7 @@ ValidationResult run_case(const ValidationCase& which, int resolution, const Sce
   result.particles = state.size();
   result.wall_particles = walls.size();
   result.backend = backend.info();
-  const auto observer =
-      which.observe({scene, walls, resolution, result.backend.precision == "fp32", experiments});
+  const auto observer = which.observe({scene, walls, resolution, result.backend.precision == "fp32", experiments});
   backend.load(scene, walls, state);
   const auto start = std::chrono::steady_clock::now();
   for (int frame = 0; frame <= scene.schedule.frames; ++frame) {
@@ -68,8 +66,7 @@ ValidationResult run_case(const ValidationCase& which, int resolution, const Sce
     observer->look({scene.time_at(state.substep), state, fields});
     if (frame_done) frame_done(frame);
   }
-  result.solver_seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  result.solver_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   result.substeps = state.substep;
   result.simulated_seconds = scene.time_at(state.substep);
   observer->finish(result);
@@ -92,8 +89,7 @@ std::vector<ObservedOrder> observed_orders(const std::vector<ValidationResult>& 
         if (before.name == quantity.name && before.error > 0 && quantity.error > 0)
           orders.push_back({fine.name, quantity.name, coarse->resolution, fine.resolution,
                             std::log(before.error / quantity.error) /
-                                std::log(static_cast<double>(fine.resolution) /
-                                         coarse->resolution)});
+                                std::log(static_cast<double>(fine.resolution) / coarse->resolution)});
   }
   return orders;
 }

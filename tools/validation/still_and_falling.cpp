@@ -18,9 +18,7 @@ namespace {
 class FreeFall : public CaseObserver {
  public:
   explicit FreeFall(const CaseInputs& inputs)
-      : scene_(inputs.scene),
-        walls_(inputs.walls),
-        unit_(inputs.single_precision ? unit_roundoff : 0x1p-53) {}
+      : scene_(inputs.scene), walls_(inputs.walls), unit_(inputs.single_precision ? unit_roundoff : 0x1p-53) {}
 
   void look(const Moment& moment) override {
     const Vec3 x = moment.state.position.rowwise().mean(), v = moment.state.velocity.rowwise().mean();
@@ -42,20 +40,18 @@ class FreeFall : public CaseObserver {
     }
     last_substep_ = n;
     const OracleAnswer oracle = answer(scene_, walls_, moment.state);
-    tolerance_ = std::max(tolerance_, oracle.tolerance.acceleration.colwise().norm().mean() *
-                                          unit_ / unit_roundoff);
+    tolerance_ = std::max(tolerance_, oracle.tolerance.acceleration.colwise().norm().mean() * unit_ / unit_roundoff);
     fastest_ = std::max(fastest_, moment.state.velocity.cwiseAbs().maxCoeff() + gained_);
     farthest_ = std::max(farthest_, moment.state.position.cwiseAbs().maxCoeff());
   }
 
   void finish(ValidationResult& result) override {
-    result.add({"mean velocity", "m/s", gained_, gained_ + velocity_error_,
-                velocity_error_ / gained_, velocity_bound_ / gained_});
+    result.add({"mean velocity", "m/s", gained_, gained_ + velocity_error_, velocity_error_ / gained_,
+                velocity_bound_ / gained_});
     result.add({"mean position", "m", fallen_, fallen_ + position_error_, position_error_ / fallen_,
                 position_bound_ / fallen_});
-    result.curves.push_back({"momentum", "error of the mean velocity", "t", "s",
-                             "error / what rounding may add", "1", false, time_,
-                             error_over_bound_});
+    result.curves.push_back({"momentum", "error of the mean velocity", "t", "s", "error / what rounding may add", "1",
+                             false, time_, error_over_bound_});
   }
 
  private:
@@ -78,8 +74,7 @@ Room room_of(const Scene& scene) {
   if (const auto* box = std::get_if<BoxShape>(&container.shape)) {
     Vec3 size = box->cavity.max - box->cavity.min;
     for (int a = 0; a < 2; ++a)
-      if (scene.domain.periodic[static_cast<std::size_t>(a)])
-        size[a] = scene.domain.max[a] - scene.domain.min[a];
+      if (scene.domain.periodic[static_cast<std::size_t>(a)]) size[a] = scene.domain.max[a] - scene.domain.min[a];
     return {size.x() * size.y(), container.origin.z() + box->cavity.min.z()};
   }
   const auto& profile = std::get<RevolvedShape>(container.shape).profile;
@@ -111,8 +106,7 @@ class StillWater : public CaseObserver {
 
   void look(const Moment& moment) override {
     const ParticleState& state = moment.state;
-    level_ = static_cast<double>(state.size()) * scene_.particle_mass() /
-             (scene_.fluid.rest_density * room_.area);
+    level_ = static_cast<double>(state.size()) * scene_.particle_mass() / (scene_.fluid.rest_density * room_.area);
     if (moment.time < 0.75 * scene_.schedule.end) return;
     for (Eigen::Index i = 0; i < state.size(); ++i) {
       const double z = state.position(2, i) - room_.bottom;
@@ -155,19 +149,15 @@ class StillWater : public CaseObserver {
     }
     const double rms = counted ? std::sqrt(squares / counted) / (scale * level_) : NAN;
     // Coarser than 20 layers the gate does not apply.
-    result.add({"pressure from 2 dx up, RMS", "ρgH", 0, rms, rms,
-                resolution_ >= 20 ? 0.02 : NAN});
-    result.add({"pressure of the first layer", "Pa", at_first, first,
-                std::abs(first / at_first - 1)});
+    result.add({"pressure from 2 dx up, RMS", "ρgH", 0, rms, rms, resolution_ >= 20 ? 0.02 : NAN});
+    result.add({"pressure of the first layer", "Pa", at_first, first, std::abs(first / at_first - 1)});
     result.add({"pressure beside the walls, over the exact one", "1", 1, beside_ / beside_exact_,
                 std::abs(beside_ / beside_exact_ - 1)});
     const double level = top_ + 0.5 * scene_.particle_spacing;
     result.add({"level", "m", level_, level, std::abs(level / level_ - 1)});
-    result.add({"fastest particle", "m/s", 0, fastest_,
-                fastest_ / std::sqrt(scene_.gravity.norm() * level_)});
+    result.add({"fastest particle", "m/s", 0, fastest_, fastest_ / std::sqrt(scene_.gravity.norm() * level_)});
     result.curves.push_back(std::move(found));
-    result.curves.push_back({"pressure", "hydrostatic", "p / ρgH", "1", "z / H", "1", true, {1, 0},
-                             {0, 1}});
+    result.curves.push_back({"pressure", "hydrostatic", "p / ρgH", "1", "z / H", "1", true, {1, 0}, {0, 1}});
   }
 
  private:
@@ -185,9 +175,7 @@ class StillWater : public CaseObserver {
 
 }  // namespace
 
-std::unique_ptr<CaseObserver> observe_free_fall(const CaseInputs& inputs) {
-  return std::make_unique<FreeFall>(inputs);
-}
+std::unique_ptr<CaseObserver> observe_free_fall(const CaseInputs& inputs) { return std::make_unique<FreeFall>(inputs); }
 
 std::unique_ptr<CaseObserver> observe_still_water(const CaseInputs& inputs) {
   return std::make_unique<StillWater>(inputs);

@@ -22,7 +22,7 @@ namespace decant {
 /// One figure of a case. Where there is an allowance the verdict hangs on error <= allowance; a NaN
 /// fails.
 struct ValidationQuantity {
-  std::string name, unit;  // unit of reference and result
+  std::string name, unit;                                       // unit of reference and result
   double reference = std::numeric_limits<double>::quiet_NaN();  // NaN: there is none
   double result = std::numeric_limits<double>::quiet_NaN();
   double error = std::numeric_limits<double>::quiet_NaN();      // a share, unless the name says else
@@ -42,9 +42,9 @@ struct ValidationCurve {
 };
 
 struct ValidationResult {
-  std::string name;    // of the case
-  std::string source;  // who says what is right
-  int resolution = 0;  // particles along the case's length
+  std::string name;             // of the case
+  std::string source;           // who says what is right
+  int resolution = 0;           // particles along the case's length
   double particle_spacing = 0;  // m
   std::int64_t particles = 0, wall_particles = 0, substeps = 0;
   double simulated_seconds = 0, solver_seconds = 0;
@@ -100,9 +100,8 @@ Scene scene_of(const ValidationCase& which, int resolution, const std::filesyste
 /// Runs a case and asks its observer. Throws BackendError where the backend reports trouble.
 /// \param scene  the case's at this resolution; \param experiments  folder of measured curves
 /// \param frame_done  called with the number of frames done; may be empty
-ValidationResult run_case(const ValidationCase& which, int resolution, const Scene& scene,
-                          Backend& backend, const std::filesystem::path& experiments,
-                          const std::function<void(int)>& frame_done = {});
+ValidationResult run_case(const ValidationCase& which, int resolution, const Scene& scene, Backend& backend,
+                          const std::filesystem::path& experiments, const std::function<void(int)>& frame_done = {});
 
 /// Observed orders of convergence: for every gated or reported error of a case that ran at several
 /// resolutions, log(e_coarse/e_fine) / log(n_fine/n_coarse) between neighbors, n the resolution.
@@ -119,8 +118,7 @@ std::string validation_table(const std::vector<ValidationResult>& results);
 /// Everything that was found, with curves; layout in oracle/formats/validation.md. Appears whole or not at
 /// all.
 /// \param interrupted  how far the work came; empty: it is complete
-void write_validation(const std::filesystem::path& file,
-                      const std::vector<ValidationResult>& results,
+void write_validation(const std::filesystem::path& file, const std::vector<ValidationResult>& results,
                       const std::string& interrupted = {});
 
 }  // namespace decant

@@ -38,21 +38,18 @@ class Channel : public CaseObserver {
       return largest;
     };
     const double rms = worst(rms_.y, first_judged_);
-    result.add({"velocity, largest RMS from 0.1 L²/ν on", "peak", 0, rms, rms,
-                resolution_ >= 20 ? 0.02 : NAN});
+    result.add({"velocity, largest RMS from 0.1 L²/ν on", "peak", 0, rms, rms, resolution_ >= 20 ? 0.02 : NAN});
     const double last = rms_.y.empty() ? NAN : rms_.y.back();
     result.add({"velocity, RMS at the end", "peak", 0, last, last});
     for (auto& curve : curves_) result.curves.push_back(std::move(curve));
-    result.curves.push_back({"error", "simulated", "νt / L²", "1", "RMS / peak", "1", false,
-                             rms_.x, rms_.y});
+    result.curves.push_back({"error", "simulated", "νt / L²", "1", "RMS / peak", "1", false, rms_.x, rms_.y});
   }
 
  private:
   void judge(const Moment& moment, double diffusion) {
     double squares = 0;
     for (Eigen::Index i = 0; i < moment.state.size(); ++i) {
-      const double error =
-          moment.state.velocity(0, i) - exact_(moment.state.position(2, i), moment.time);
+      const double error = moment.state.velocity(0, i) - exact_(moment.state.position(2, i), moment.time);
       squares += error * error;
     }
     if (diffusion < 0.1 * (1 - 1e-9)) first_judged_ = rms_.x.size() + 1;
@@ -111,16 +108,15 @@ class Drop : public CaseObserver {
     time_.push_back(moment.time);
     long_.push_back(b / radius_);
     short_.push_back(a / radius_);
-    extent_.push_back((0.5 * (z.maxCoeff() - z.minCoeff()) + 0.5 * scene_.particle_spacing) /
-                      radius_);
+    extent_.push_back((0.5 * (z.maxCoeff() - z.minCoeff()) + 0.5 * scene_.particle_spacing) / radius_);
   }
 
   void finish(ValidationResult& result) override {
     const Curve b{time_, long_}, a{time_, short_};
     for (const double t : {0.0008, 0.0038, 0.0076}) {
       const double exact = drop_axis(stretching_, t), found = value_at(b, t);
-      result.add({"b at t = " + std::to_string(t).substr(0, 6) + " s", "R", exact, found,
-                  std::abs(found / exact - 1), 0.03});
+      result.add(
+          {"b at t = " + std::to_string(t).substr(0, 6) + " s", "R", exact, found, std::abs(found / exact - 1), 0.03});
     }
     const double product = long_.back() * short_.back();
     result.add({"a·b at the end", "R²", 1, product, std::abs(product - 1)});
@@ -156,23 +152,18 @@ std::unique_ptr<CaseObserver> observe_couette(const CaseInputs& inputs) {
   const Scene& scene = inputs.scene;
   double V = 0;
   for (const auto& plate : scene.containers) V += plate.surface_velocity.x();
-  const double nu = scene.fluid.viscosity / scene.fluid.rest_density,
-               L = inputs.resolution * scene.particle_spacing;
-  return std::make_unique<Channel>(
-      inputs, V, [=](double z, double t) { return couette_velocity(V, nu, L, z, t); });
+  const double nu = scene.fluid.viscosity / scene.fluid.rest_density, L = inputs.resolution * scene.particle_spacing;
+  return std::make_unique<Channel>(inputs, V, [=](double z, double t) { return couette_velocity(V, nu, L, z, t); });
 }
 
 std::unique_ptr<CaseObserver> observe_poiseuille(const CaseInputs& inputs) {
   const Scene& scene = inputs.scene;
   const double F = scene.gravity.x(), nu = scene.fluid.viscosity / scene.fluid.rest_density,
                L = inputs.resolution * scene.particle_spacing;
-  return std::make_unique<Channel>(
-      inputs, F * L * L / (8 * nu),
-      [=](double z, double t) { return poiseuille_velocity(F, nu, L, z, t); });
+  return std::make_unique<Channel>(inputs, F * L * L / (8 * nu),
+                                   [=](double z, double t) { return poiseuille_velocity(F, nu, L, z, t); });
 }
 
-std::unique_ptr<CaseObserver> observe_drop(const CaseInputs& inputs) {
-  return std::make_unique<Drop>(inputs);
-}
+std::unique_ptr<CaseObserver> observe_drop(const CaseInputs& inputs) { return std::make_unique<Drop>(inputs); }
 
 }  // namespace decant

@@ -22,22 +22,19 @@ double length_of(std::vector<double> x, double dx) {
   for (const double value : x)
     if (apart.empty() || value - apart.back() > 0.1 * dx) apart.push_back(value);
   if (apart.size() < 2)
-    throw std::runtime_error(fmt::format("a wall patch needs 2 rows of particles, it has {}",
-                                         apart.size()));
+    throw std::runtime_error(fmt::format("a wall patch needs 2 rows of particles, it has {}", apart.size()));
   const auto n = static_cast<double>(apart.size());
   return (apart.back() - apart.front()) * n / (n - 1);
 }
 
 }  // namespace
 
-WallPatch::WallPatch(const Scene& scene, const Walls& walls, const SolidBox& box,
-                     const Vec3& normal)
+WallPatch::WallPatch(const Scene& scene, const Walls& walls, const SolidBox& box, const Vec3& normal)
     : scene_(scene), normal_(normal) {
   const PosedWalls posed = pose_walls(scene, walls, 0);
   for (Eigen::Index b = 0; b < posed.position.cols(); ++b) {
     const Vec3 x = posed.position.col(b);
-    if ((x.array() >= box.min.array()).all() && (x.array() <= box.max.array()).all())
-      ids_.push_back(b);
+    if ((x.array() >= box.min.array()).all() && (x.array() <= box.max.array()).all()) ids_.push_back(b);
   }
   if (ids_.empty()) throw std::runtime_error("a wall patch holds no wall particles");
   position_.resize(3, static_cast<Eigen::Index>(ids_.size()));
@@ -53,15 +50,13 @@ WallPatch::WallPatch(const Scene& scene, const Walls& walls, const SolidBox& box
     if (std::abs(normal[a]) > 0.5) continue;
     std::vector<double> face;
     for (Eigen::Index k = 0; k < position_.cols(); ++k)
-      if (position_.col(k).dot(normal) < nearest + 0.5 * scene.particle_spacing)
-        face.push_back(position_(a, k));
+      if (position_.col(k).dot(normal) < nearest + 0.5 * scene.particle_spacing) face.push_back(position_(a, k));
     area_ *= length_of(std::move(face), scene.particle_spacing);
   }
 }
 
 double WallPatch::pressure(const ParticleState& state, const Fields& fields) const {
-  const double H = scene_.support_radius(), m = scene_.particle_mass(),
-               rho0 = scene_.fluid.rest_density;
+  const double H = scene_.support_radius(), m = scene_.particle_mass(), rho0 = scene_.fluid.rest_density;
   const Kernel<double> kernel(scene_.kernel, H);
   double force = 0;
   for (Eigen::Index i = 0; i < state.size(); ++i) {
