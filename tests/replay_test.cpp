@@ -204,7 +204,7 @@ TEST(Replays, AreOneABackendAndFixtureOfTheFirstRowThatFailsAtAFluidParticle) {
   for (const Replay& replay : replays_of(report, "out")) names.push_back(replay.file.string());
   EXPECT_EQ(names, (std::vector<std::string>{"out/pour-brute-invariance-moved-density-6.h5",
                                              "out/pour-hash-boundary_volume-boundary_volume-8.h5",
-                                             "out/pour-hash-sort-thrust-lanes-4-density-density-9.h5"}));
+                                             "out/pour-hash-sort-thrust-threads_per_particle-4-density-density-9.h5"}));
 }
 
 TEST(Surroundings, HoldFluidAndWallsWithinTheirRadiusWithTheRowsScores) {

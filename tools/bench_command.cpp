@@ -47,7 +47,7 @@ constexpr const char* footer =
     "\n"
     "Examples:\n"
     "  decant bench --backend brute,hash,list --executor cuda --json build/bench.json\n"
-    "  decant bench pour-4k-stream --backend hash,hash:force_neighbors=recomputed,list:skin=0.1";
+    "  decant bench pour-4k-stream --backend hash,hash:sort=thrust,list:skin=0.1";
 
 // Seconds that a window takes, about, where --substeps leaves it open.
 constexpr double usual_window = 0.1;
