@@ -42,7 +42,7 @@ const std::vector<CheckDescription>& check_descriptions() {
        "A friction or a restitution wrong by 1e-5."},
       {"advanced",
        "Neighbor counts and id sums, density, pressure and accelerations after some substeps, from what "
-       "the backend has in use then: kept lists, sorted orders, places of walls. The state is read and "
+       "the backend has in use then: kept lists, sorted orders, positions of walls. The state is read and "
        "the oracle answers there; the backend is not loaded again in between.",
        "As of `fields`, at the state that was read.",
        "What a backend keeps for its runs and does not use when it evaluates."},
@@ -50,35 +50,35 @@ const std::vector<CheckDescription>& check_descriptions() {
        "How far the backend is from the oracle after some tens of substeps: RMS and 99th percentile of "
        "position and velocity, and the total energy.",
        "3 (mean + 6 standard deviations) of an ensemble of oracle runs recorded in the fixture: x and v "
-       "disturbed by fp32's rounding before every substep, and every constant once. The 3 is √9, the "
-       "roundings of a contact beside the one that a disturbance stands for (oracle/ensemble.hpp). RMS "
+       "perturbed by fp32's rounding before every substep, and every constant once. The 3 is √9, the "
+       "roundings of a contact beside the one that a perturbation stands for (oracle/ensemble.hpp). RMS "
        "and percentile, because the maximum over thousands of particles is decided by one collision. A "
        "viscosity wrong by 1 % shows in the energy of settled and splashing fluid.",
        "An error below rounding, however systematic."},
       {"mass",
        "After the run every id is there once and finite, and no more are outside the domain than in the oracle's "
-       "run; the particles of all places (source, in flight, receiver, spilled, lost) add up to all particles.",
+       "run; the particles of all regions (source, in flight, receiver, spilled, lost) add up to all particles.",
        "Exact: counts. Two with the same position and velocity, bit for bit, are one too many, unless the "
        "oracle has them in one place as well or they started as one.",
        "Two ids exchanged (fields and substep see that)."},
       {"containment",
        "Depth inside any wall and paths through walls during the run, judged in double from positions and "
-       "from the way between two looks, in each container's own frame.",
+       "from the way between two samples, in each container's own frame.",
        "No deeper, and no more crossings, than the oracle's own run shows; where that is inside a wall "
        "itself, or there is a floor, a distance's rounding of 8 u X deeper; elsewhere what of that exceeds "
        "the contact distance.",
-       "What happens between two looks and is undone."},
+       "What happens between two samples and is undone."},
       {"determinism",
        "Two evaluations and two runs from the same state give the same bits, and the same numbers of rebuilds "
        "and, where lists verify themselves, of pairs.",
        "Exact: the number of values that differ is 0.", "A race that did not happen this time."},
-      {"conservation", "The forces between fluid particles add up to nothing, pressure and viscosity apart: momentum.",
+      {"conservation", "The forces between fluid particles sum to zero, pressure and viscosity apart: momentum.",
        "√Σ tau_i² of the particles' own tolerances: rounding errors of different particles are "
        "independent.",
        "A factor on all forces."},
       {"invariance",
        "Density, pressure and acceleration of the same state with its ids permuted, moved by half a "
-       "meter along every axis, and turned by a quarter about z, each against the oracle's answer to "
+       "meter along every axis, and rotated by a quarter turn about z, each against the oracle's answer to "
        "the changed problem.",
        "That answer's own tolerances; moved states are rounded to fp32 first, for both sides.",
        "What is wrong in the same way everywhere."},

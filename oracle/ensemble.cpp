@@ -1,5 +1,5 @@
 /// \file
-/// Disturbed runs and the distances between runs.
+/// Perturbed runs and the distances between runs.
 #include "oracle/ensemble.hpp"
 
 #include "reference/neighbors.hpp"
@@ -35,9 +35,9 @@ double percentile99(std::vector<double> lengths) {
   return *at;
 }
 
-class Disturbance {
+class Perturbation {
  public:
-  explicit Disturbance(std::uint32_t seed) : random_(seed) {}
+  explicit Perturbation(std::uint32_t seed) : random_(seed) {}
 
   void of(double& value) { value *= 1 + 0x1p-24 * share_(random_); }
   void of(ParticleState& state) {
@@ -86,21 +86,21 @@ Divergence divergence(const Scene& scene, const ParticleState& a, const Particle
 
 namespace {
 
-ParticleState run_undisturbed(Solver solver, std::int64_t substeps) {
+ParticleState run_unperturbed(Solver solver, std::int64_t substeps) {
   for (std::int64_t k = 0; k < substeps; ++k) solver.substep();
   return solver.state();
 }
 
-/// A disturbance leaves the walls' volumes alone: V_b knows nothing but their own distances.
-ParticleState run_disturbed(const Scene& scene, const Walls& walls, const Eigen::VectorXd& volumes,
+/// A perturbation leaves the walls' volumes alone: V_b knows nothing but their own distances.
+ParticleState run_perturbed(const Scene& scene, const Walls& walls, const Eigen::VectorXd& volumes,
                             const ParticleState& start, std::int64_t substeps, std::uint32_t seed) {
-  Disturbance disturbance(seed);
+  Perturbation perturbation(seed);
   Scene its_scene = scene;
-  disturbance.of(its_scene);
+  perturbation.of(its_scene);
   Solver solver(its_scene, walls, start, volumes);
   ParticleState state = start;
   for (std::int64_t k = 0; k < substeps; ++k) {
-    disturbance.of(state);
+    perturbation.of(state);
     solver.restart(state);
     solver.substep();
     state = solver.state();
@@ -112,26 +112,26 @@ ParticleState run_disturbed(const Scene& scene, const Walls& walls, const Eigen:
 }  // namespace
 
 ParticleState run_oracle(const Scene& scene, const Walls& walls, const ParticleState& start, std::int64_t substeps) {
-  return run_undisturbed(Solver(scene, walls, start), substeps);
+  return run_unperturbed(Solver(scene, walls, start), substeps);
 }
 
-ParticleState run_disturbed(const Scene& scene, const Walls& walls, const ParticleState& start, std::int64_t substeps,
+ParticleState run_perturbed(const Scene& scene, const Walls& walls, const ParticleState& start, std::int64_t substeps,
                             std::uint32_t seed) {
-  return run_disturbed(scene, walls, boundary_volumes<double>(scene, walls), start, substeps, seed);
+  return run_perturbed(scene, walls, boundary_volumes<double>(scene, walls), start, substeps, seed);
 }
 
 Ensemble run_ensemble(const Scene& scene, const Walls& walls, const ParticleState& start, std::int64_t substeps,
                       std::int64_t members, std::uint32_t seed) {
   const Eigen::VectorXd volumes = boundary_volumes<double>(scene, walls);
-  const ParticleState undisturbed = run_undisturbed(Solver(scene, walls, start, volumes), substeps);
+  const ParticleState unperturbed = run_unperturbed(Solver(scene, walls, start, volumes), substeps);
   Ensemble e;
   e.substeps = substeps;
   e.members = members;
   std::vector<Divergence> all;
   for (std::int64_t m = 0; m < members; ++m)
     all.push_back(
-        divergence(scene, run_disturbed(scene, walls, volumes, start, substeps, seed + static_cast<std::uint32_t>(m)),
-                   undisturbed));
+        divergence(scene, run_perturbed(scene, walls, volumes, start, substeps, seed + static_cast<std::uint32_t>(m)),
+                   unperturbed));
   const auto count = static_cast<double>(members);
   for (std::size_t k = 0; k < e.mean.size(); ++k) {
     for (const auto& d : all) e.mean[k] += d[k] / count;
@@ -143,7 +143,7 @@ Ensemble run_ensemble(const Scene& scene, const Walls& walls, const ParticleStat
 }
 
 Divergence divergence_bound(const Ensemble& ensemble) {
-  // A disturbance is one rounding of x and one of v. A backend in a contact makes about nine: x + dt v,
+  // A perturbation is one rounding of x and one of v. A backend in a contact makes about nine: x + dt v,
   // four to the container's frame, two of distance and normal, two of the push; they add in squares.
   constexpr double roundings = 3;
   Divergence bound{};

@@ -44,7 +44,7 @@ struct Fixture {
   Eigen::VectorXd sample_density, sample_pressure;
   Eigen::Matrix3Xd sample_acceleration;
   std::string fields_digest;  // study scale: digest_of of all fields
-  Ensemble ensemble;          // of disturbed runs from here on
+  Ensemble ensemble;          // of perturbed runs from here on
   /// version, compiler, flags, …; scene_sha256 is set by write_fixture.
   std::map<std::string, std::string> provenance;
 

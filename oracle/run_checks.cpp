@@ -68,7 +68,7 @@ void judge_trajectory(const Run& r, const Fixture& fixture, const Judgement& ora
     CheckRow& row = sheet.row("trajectory", divergence_names[k], divergence_units[k]);
     compare(apart[k], bound[k], row);
     if (row.verdict == Verdict::fail)
-      row.reason = fmt::format("{} substeps on; {} disturbed runs of the oracle are apart by {:.3g} ± {:.2g}",
+      row.reason = fmt::format("{} substeps on; {} perturbed runs of the oracle are apart by {:.3g} ± {:.2g}",
                                fixture.ensemble.substeps, fixture.ensemble.members, fixture.ensemble.mean[k],
                                fixture.ensemble.deviation[k]);
   }

@@ -38,7 +38,7 @@ Forms random_forms(std::mt19937& random);
 Fields evaluate_by(const Forms& forms, const Scene& scene, const Walls& walls, const ParticleState& state,
                    const StageInputs* given = nullptr);
 
-/// A few hundred particles that no pour would show: lattices, exact and disturbed by any amount, and
+/// A few hundred particles that no pour would show: lattices, exact and perturbed by any amount, and
 /// clouds, free and in tanks at rest and tilting about pivots up to 20 m away, H = 2 to 4 dx.
 Fixture random_form_case(std::uint32_t seed);
 

@@ -285,8 +285,8 @@ TEST(Trajectory, ShowsAPercentOfViscosityInItsEnergy) {
   }
 }
 
-/// The bound is wide enough: a run that is disturbed as the ensemble was, by other numbers, passes.
-TEST(Trajectory, PassesDisturbedRuns) {
+/// The bound is wide enough: a run that is perturbed as the ensemble was, by other numbers, passes.
+TEST(Trajectory, PassesPerturbedRuns) {
   const Fixture fixture = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-stream.h5");
   const Ensemble others =
       run_ensemble(fixture.scene, sample_walls(fixture.scene), fixture.state, fixture.ensemble.substeps, 4, 99);

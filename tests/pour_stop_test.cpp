@@ -304,7 +304,7 @@ TEST(StoppedPour, InsideAFrameIsResumedToTheSameBitsAndTheSameTimeline) {
   }
 }
 
-TEST(ResumedPour, IsThatOfTheSameDisturbance) {
+TEST(ResumedPour, IsThatOfTheSamePerturbation) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene();
   FallingPoints backend;

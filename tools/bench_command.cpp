@@ -269,7 +269,7 @@ int bench(BenchArguments& arguments) {
 
 void add_bench_command(CLI::App& app, int& exit_status) {
   auto arguments = std::make_shared<BenchArguments>();
-  CLI::App* verb = app.add_subcommand("bench", "time a substep of backends that conform");
+  CLI::App* verb = app.add_subcommand("bench", "time per substep of backends that conform");
   verb->footer(footer);
   verb->add_option("FIXTURE", arguments->fixtures, "recordings (*.h5); default: the small ones");
   verb->add_option("--backend", arguments->backends,

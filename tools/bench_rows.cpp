@@ -116,10 +116,11 @@ void write_bench_hdf5(const std::string& file, const std::vector<BenchRow>& rows
         [s](const BenchRow& r) { return r.tells_stages ? r.stages_us[s] : std::nan(""); }, "us",
         "share of a substep; NaN: not told");
   real(
-      "neighbors_mean", [](const BenchRow& r) { return r.neighbors_mean; }, "1", "fluid and wall neighbors a particle");
+      "neighbors_mean", [](const BenchRow& r) { return r.neighbors_mean; }, "1",
+      "fluid and wall neighbors per particle");
   real(
       "interactions_per_s", [](const BenchRow& r) { return r.interactions_per_s(); }, "1/s",
-      "neighbors found in a second");
+      "neighbors found per second");
   real("substeps_per_rebuild", [](const BenchRow& r) { return r.substeps_per_rebuild; }, "1", "0: not told");
   real("device_bytes_per_particle", [](const BenchRow& r) { return r.device_bytes_per_particle; }, "B", "0: not told");
   for (const auto& [key, value] : provenance()) out.attribute("/provenance", key, value);

@@ -28,7 +28,7 @@ struct DiffArguments {
 constexpr const char* footer =
     "Two reports: rows are the same where backend, options, executor, fixture, check and field are.\n"
     "Two pours of one scene (folders, or their frames.h5): distances frame by frame, positions in dx.\n"
-    "Fluid is chaotic, so that right answers part too: further pours from disturbed starts\n"
+    "Fluid is chaotic, so that right answers part too: further pours from perturbed starts\n"
     "(`decant pour --perturb SEED`), given with --spread, say how far. A frame is within the spread where\n"
     "every distance but that of energies is at most --factor times the largest between pours of the\n"
     "spread until then.\n"
@@ -155,7 +155,7 @@ void add_diff_command(CLI::App& app, int& exit_status) {
   verb->footer(footer);
   verb->add_option("BEFORE", arguments->before, "report (*.h5), or a pour's folder")->required();
   verb->add_option("AFTER", arguments->after, "another of the same kind")->required();
-  verb->add_option("--spread", arguments->spread, "pours: more of them, from disturbed starts");
+  verb->add_option("--spread", arguments->spread, "pours: more of them, from perturbed starts");
   verb->add_option("--pair", arguments->pairs, "reports: BEFORE=AFTER, backends of different names to compare");
   verb->add_option("--factor", arguments->factor,
                    "reports: scores that moved by more are told (default 2);\n"

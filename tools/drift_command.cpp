@@ -34,7 +34,7 @@ struct DriftArguments {
   double tolerance = 1e-3;
 };
 
-constexpr int disturbed_pours = 4;
+constexpr int perturbed_pours = 4;
 
 constexpr const char* footer =
     "From each state a window of substeps is run with lists that miss nothing. Along it, lists rebuilt\n"
@@ -48,7 +48,7 @@ constexpr const char* footer =
     "                  prove that none is (two largest of the fluid, or of fluid and wall <= skin)\n"
     "  density, accel.  RMS error over RMS field, the largest; wall's: the wall's terms alone\n"
     "  deviation       of positions after the fixture's ensemble length, over the ensemble's own\n"
-    "  us              a substep by the backend, rebuilds included\n"
+    "  us              per substep by the backend, rebuilds included\n"
     "`auto` rebuilds before a pair can be missed: the point to beat. Safe intervals: measured, proved by\n"
     "the displacements seen, expected from the first state's speeds, and from how fast pairs near H\n"
     "approach. Powers: of the relative motion, ± 95 %, (what the kernel's edge gives).\n"
@@ -125,7 +125,7 @@ void print(const Recommendation* best, double tolerance, std::size_t windows) {
   const bool adaptive = best->list.interval == 0;
   fmt::print(
       "\nrecommended, for acceleration within {:g} (relative RMS) in each of {} windows: --backend list{}{}\n"
-      "  error {:.1e} at the worst substep, {}; {:.1f} us a substep, the adaptive list {:.1f} us\n",
+      "  error {:.1e} at the worst substep, {}; {:.1f} us per substep, the adaptive list {:.1f} us\n",
       tolerance, windows, adaptive ? "" : ":", best->list.options(), best->worst_error,
       adaptive ? "by proof" : fmt::format("theory expected {:.1e}", best->expected_error), best->substep_us,
       best->adaptive_us);
@@ -191,7 +191,7 @@ void run(DriftArguments& arguments, int& exit_status) {
     for (Fixture& phase : phases) states.push_back(std::move(phase));
     if (arguments.whole)
       whole_pours(
-          scene, plan, disturbed_pours, make_list, [&](const auto& part) { work.part(part); }, pours.back().whole);
+          scene, plan, perturbed_pours, make_list, [&](const auto& part) { work.part(part); }, pours.back().whole);
     progress.update(1, scene.name);
   }
   if (arguments.recommend)

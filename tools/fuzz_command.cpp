@@ -32,7 +32,7 @@ std::string footer() {
   std::string text =
       "Each seed gives a small scene and a hostile or harmless state in it. A campaign takes consecutive\n"
       "seeds; campaigns of disjoint seeds may run side by side, and tools/merge_fuzz.py joins their\n"
-      "reports. What fails is shrunk and written as a fixture, which `decant conform` shows again, with\n"
+      "reports. What fails is minimised and written as a fixture, which `decant conform` shows again, with\n"
       "its scene beside it. Ctrl-C ends a campaign and keeps what it found: exit status 130.\n"
       "\n"
       "Properties; where none is named, the expensive ones are asked of every 2nd, 4th or 8th problem:\n";
@@ -99,7 +99,7 @@ void run(FuzzArguments& arguments, int& exit_status) {
         worst = std::max(worst, tally.worst);
         failed += tally.failed;
       }
-      const std::string note = fmt::format("{:.0f} a second, worst score {:.3f}, {} failures",
+      const std::string note = fmt::format("{:.0f} per second, worst score {:.3f}, {} failures",
                                            static_cast<double>(now.cases) / now.seconds, worst, failed);
       if (arguments.cases >= 0) progress.update(now.cases, note);
       else if (!arguments.quiet) fmt::print(stderr, "\r{:.0f} s, {} problems, {}  ", now.seconds, now.cases, note);
@@ -121,7 +121,7 @@ void run(FuzzArguments& arguments, int& exit_status) {
 
 void add_fuzz_command(CLI::App& app, int& exit_status) {
   auto arguments = std::make_shared<FuzzArguments>();
-  CLI::App& verb = *app.add_subcommand("fuzz", "random problems, held to properties and shrunk");
+  CLI::App& verb = *app.add_subcommand("fuzz", "property-based tests on random scenes; counterexamples are minimised");
   verb.add_option("--backend", arguments->backends, "NAME or NAME:OPTIONS, several by commas")
       ->delimiter(',')
       ->capture_default_str();

@@ -188,7 +188,7 @@ void Pour::lock_folder() {
 
 void Pour::start() {
   state_ = call([&] { return initial_state(scene_); });
-  if (options_.perturbation != 0) state_ = disturbed_start(state_, options_.perturbation);
+  if (options_.perturbation != 0) state_ = perturbed_start(state_, options_.perturbation);
   layout_ = frame_layout(scene_, state_.size());
   check_room(options_, files_, layout_, 0);
   fs::create_directories(options_.out);

@@ -32,7 +32,7 @@ struct PourOptions {
   /// by another thread when the checkpoint is written, with what there is to say. `frame` is −1 where there
   /// is no checkpoint yet.
   std::function<void(const PourResult&)> leave;
-  std::uint32_t perturbation = 0;  // not 0: from disturbed_start with this seed
+  std::uint32_t perturbation = 0;  // not 0: from perturbed_start with this seed
 };
 
 struct PourResult {
@@ -52,7 +52,7 @@ PourResult pour(const Scene& scene, Backend& backend, const PourOptions& options
 
 /// Every coordinate changed by a random part, up to 2⁻²². Pours that differ in nothing else show how far
 /// apart their ends may be.
-ParticleState disturbed_start(ParticleState state, std::uint32_t seed);
+ParticleState perturbed_start(ParticleState state, std::uint32_t seed);
 
 /// The scene written in `frames` frames over the same time. Substeps that the scene sets become as
 /// many as keep each of them no longer than it was; derived ones are derived anew.

@@ -92,7 +92,7 @@ int run(PourArguments& arguments) {
 }  // namespace
 
 void add_pour_command(CLI::App& app, int& exit_status) {
-  auto* command = app.add_subcommand("pour", "run a scene; write frames, timeline, mass by place");
+  auto* command = app.add_subcommand("pour", "run a scene; write frames, timeline, mass per region");
   auto a = std::make_shared<PourArguments>();
   command->add_option("SCENE", a->scene, "Scene file (JSON)")->required();
   command->add_option("--out", a->out, "Folder for frames.h5, *.xdmf, timeline.h5, csv/")->required();

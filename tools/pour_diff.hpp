@@ -1,6 +1,6 @@
 /// \file
 /// Where two pours of one scene part: frame by frame and field by field, beside the spread of pours
-/// that differ in nothing but a start disturbed in its last bits.
+/// that differ in nothing but a start perturbed in its last bits.
 #pragma once
 
 #include <array>
@@ -58,7 +58,7 @@ struct PourDiff {
 /// True where the path is a pour's folder, or its frames.h5.
 bool is_pour(const std::filesystem::path& path);
 
-/// Reads the frames that all of the pours have. \param spread  pours of the same scene from disturbed
+/// Reads the frames that all of the pours have. \param spread  pours of the same scene from perturbed
 /// starts; with `before` they make the spread. Throws InputError where a folder holds no frames, or
 /// another scene or another number of particles than `before`.
 PourDiff pour_difference(const std::filesystem::path& before, const std::filesystem::path& after,

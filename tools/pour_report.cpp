@@ -87,7 +87,7 @@ void print_pour(const PourResult& result, const BackendInfo& info, const Scene& 
   fmt::print("  extremes   {:.3g} m/s, {:.1f} kg/m³\n", s.max_speed, s.max_density);
   for (const LimitExceeded& e : result.limits_exceeded)
     fmt::print("  BEYOND     {}; {} frames, at most {:.4g} {}\n", describe(e), e.frames, e.largest, e.unit);
-  fmt::print("  time       {} in all; solver {:.4g} µs a substep", duration_text(s.wall_seconds),
+  fmt::print("  time       {} in all; solver {:.4g} µs per substep", duration_text(s.wall_seconds),
              1e6 * s.seconds_per_substep);
   for (const StageName& stage : stage_names)
     if (const StageTimes::Stage& time = result.timeline.stages.*stage.stage; time.calls > 0)

@@ -7,7 +7,7 @@
 
 namespace decant {
 
-ParticleState disturbed_start(ParticleState state, std::uint32_t seed) {
+ParticleState perturbed_start(ParticleState state, std::uint32_t seed) {
   std::mt19937 random(seed);
   for (double& x : state.position.reshaped())
     x *= 1 + 0x1p-22 * (2.0 * static_cast<double>(random()) / 4294967295.0 - 1);

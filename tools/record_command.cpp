@@ -267,7 +267,7 @@ void add_record_command(CLI::App& app, int& exit_status) {
   verb->add_option("--executor", arguments->executor, "auto, cuda or host")->capture_default_str();
   verb->add_flag("--sample", arguments->sample, "study scale: a digest and a sample of the fields");
   verb->add_option("--ensemble-substeps", arguments->ensemble_substeps,
-                   "how long the disturbed runs of the trajectory check are")
+                   "how long the perturbed runs of the trajectory check are")
       ->check(CLI::Range(1, 10'000))
       ->capture_default_str();
   verb->add_option("--ensemble-members", arguments->ensemble_members, "how many they are")

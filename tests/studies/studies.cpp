@@ -5,7 +5,7 @@
 ///           A correct backend above 1 is a false alarm; a median below 0.01 is a bound too loose.
 /// forms     every legal way to write the fields in fp32, on recordings and random cases: none may exceed a
 ///           tolerance.
-/// ensemble  thousands of disturbed runs of the oracle against the bound of the recorded ensemble: how
+/// ensemble  thousands of perturbed runs of the oracle against the bound of the recorded ensemble: how
 ///           often a correct run would be called wrong; and a viscosity wrong by 1 % against the same.
 /// coverage  which values of which keys of a scene the recordings and fuzzed problems have.
 #include "gpu/backends.hpp"
@@ -174,7 +174,7 @@ int forms(const Settings& s) {
 
 int ensemble(const Settings& s) {
   std::string text = fmt::format(
-      "Disturbed runs of the oracle against the bound 3 (mean + 6 deviations) of the recorded ensemble.\n"
+      "Perturbed runs of the oracle against the bound 3 (mean + 6 deviations) of the recorded ensemble.\n"
       "Divergence over bound: median and largest of {} runs by other numbers; false alarms; the same of one\n"
       "run with viscosity × 1.01, caught where above 1.\n\n{:<28} {:<13} {:>8} {:>8} {:>7} {:>9}\n",
       s.members, "fixture", "measure", "median", "largest", "alarms", "viscosity");
@@ -185,11 +185,11 @@ int ensemble(const Settings& s) {
     const Walls walls = sample_walls(fixture.scene);
     const auto substeps = fixture.ensemble.substeps;
     const Divergence bound = divergence_bound(fixture.ensemble);
-    const ParticleState undisturbed = run_oracle(fixture.scene, walls, fixture.state, substeps);
+    const ParticleState unperturbed = run_oracle(fixture.scene, walls, fixture.state, substeps);
     std::vector<Divergence> apart;
     for (const auto& line : spread(s.processes, static_cast<std::uint32_t>(s.members), [&](std::uint32_t k) {
            const Divergence d = divergence(
-               fixture.scene, run_disturbed(fixture.scene, walls, fixture.state, substeps, 1000 + k), undisturbed);
+               fixture.scene, run_perturbed(fixture.scene, walls, fixture.state, substeps, 1000 + k), unperturbed);
            return fmt::format("{}\n", fmt::join(d, " "));
          })) {
       std::istringstream columns(line);
@@ -198,7 +198,7 @@ int ensemble(const Settings& s) {
     Scene thicker = fixture.scene;
     thicker.fluid.viscosity *= 1.01;
     const Divergence wrong =
-        divergence(fixture.scene, run_oracle(thicker, walls, fixture.state, substeps), undisturbed);
+        divergence(fixture.scene, run_oracle(thicker, walls, fixture.state, substeps), unperturbed);
     std::vector<bool> alarmed(apart.size());
     for (std::size_t m = 0; m < bound.size(); ++m) {
       std::vector<double> share;
@@ -239,7 +239,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   CLI::App* scores = app.add_subcommand("scores", "random cases");
   CLI::App* forms = app.add_subcommand("forms", "legal forms of fp32");
-  CLI::App* ensemble = app.add_subcommand("ensemble", "disturbed runs");
+  CLI::App* ensemble = app.add_subcommand("ensemble", "perturbed runs");
   scores->add_option("--cases", s.cases)->capture_default_str();
   scores->add_option("--first", s.first, "first seed")->capture_default_str();
   scores->add_option("--backend", s.backends)->delimiter(',')->capture_default_str();

@@ -86,7 +86,7 @@ struct SafeInterval {
 struct WholePour {
   std::string fixture;
   ListChoice list;
-  std::uint32_t perturbation = 0;    // not 0: complete lists, and a start disturbed by rounding
+  std::uint32_t perturbation = 0;    // not 0: complete lists, and a start perturbed by rounding
   std::string trouble;               // of the backend; the rest is then NaN
   std::array<double, 5> share_at{};  // of the mass, by Place, at the end
   std::int64_t inside = 0;           // particles seen inside a solid, largest count
@@ -156,9 +156,9 @@ PourDrift along_pour(const Scene& scene, const DriftPlan& plan, int looks, const
 /// Does one part of long work: calls what it is given, or never returns.
 using DoPart = std::function<void(const std::function<void()>& part)>;
 
-/// The whole pour by complete lists, by `disturbed` more whose start differs by rounding, and by each list.
+/// The whole pour by complete lists, by `perturbed` more whose start differs by rounding, and by each list.
 /// They are added to `pours` one by one, each run a part of the work.
-void whole_pours(const Scene& scene, const DriftPlan& plan, int disturbed, const ListMaker& make_list,
+void whole_pours(const Scene& scene, const DriftPlan& plan, int perturbed, const ListMaker& make_list,
                  const DoPart& do_part, std::vector<WholePour>& pours);
 
 /// A run by another program: states, and the list that it used at each. Layout in

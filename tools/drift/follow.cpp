@@ -159,7 +159,7 @@ void time_and_follow(const Fixture& fixture, const Walls& walls, int window, con
   result.run_seconds = seconds_since(start);
 }
 
-void whole_pours(const Scene& scene, const DriftPlan& plan, int disturbed, const ListMaker& make_list,
+void whole_pours(const Scene& scene, const DriftPlan& plan, int perturbed, const ListMaker& make_list,
                  const DoPart& do_part, std::vector<WholePour>& pours) {
   const Walls walls = sample_walls(scene);
   const ParticleState start = initial_state(scene);
@@ -179,8 +179,8 @@ void whole_pours(const Scene& scene, const DriftPlan& plan, int disturbed, const
   if (!right.pour.trouble.empty()) throw BackendError(scene.name + ", complete lists: " + right.pour.trouble);
   compare(right, right);
   add(right, complete, 0);
-  for (int k = 1; k <= disturbed; ++k) {
-    Course course = run(disturbed_start(start, static_cast<std::uint32_t>(k)), complete);
+  for (int k = 1; k <= perturbed; ++k) {
+    Course course = run(perturbed_start(start, static_cast<std::uint32_t>(k)), complete);
     compare(right, course);
     add(std::move(course), complete, static_cast<std::uint32_t>(k));
   }

@@ -104,7 +104,7 @@ void write_rows(Hdf5Writer& out, const std::vector<DriftRow>& rows) {
   c.real("deviation", "1", [](const R& r) { return r.deviation; }, "RMS of positions beside complete lists, over dx");
   c.real(
       "deviation_over_ensemble", "1", [](const R& r) { return r.deviation_over_ensemble; },
-      "over that of runs disturbed by rounding");
+      "over that of runs perturbed by rounding");
   c.real("energy_drift", "J", [](const R& r) { return r.energy_drift; }, "beside complete lists");
   c.real("momentum_drift", "kg m/s", [](const R& r) { return r.momentum_drift; }, "beside complete lists");
 }
@@ -153,7 +153,7 @@ void write_whole(Hdf5Writer& out, const std::vector<WholePour>& pours) {
   using W = WholePour;
   Columns<W> c(out, "/whole", pours);
   list_columns(c);
-  c.whole("perturbation", [](const W& w) { return w.perturbation; }, "seed of a start disturbed by rounding; 0: none");
+  c.whole("perturbation", [](const W& w) { return w.perturbation; }, "seed of a start perturbed by rounding; 0: none");
   c.text("trouble", [](const W& w) { return w.trouble.empty() ? "none" : w.trouble; });
   for (std::size_t p = 0; p < place_names.size(); ++p)
     c.real((std::string("share_") + place_names[p]).c_str(), "1", [p](const W& w) { return w.share_at[p]; });

@@ -17,7 +17,7 @@
 
 namespace decant::fuzz {
 
-/// How long a problem's runs are, and how many disturbed ones say how far correct runs are apart.
+/// How long a problem's runs are, and how many perturbed ones say how far correct runs are apart.
 inline constexpr int run_substeps = 8, run_members = 8;
 
 /// A property that every problem has to have.

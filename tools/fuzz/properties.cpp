@@ -103,7 +103,7 @@ bool each_step_holds(Backend& backend, const Fixture& f, const Walls& walls, con
 }
 
 /// Whether a run in unequal parts, with looks and loads in between, ends where one in one piece does, as
-/// near as runs disturbed by rounding do.
+/// near as runs perturbed by rounding do.
 Outcome sequence(Backend& backend, const std::string& name, const Fixture& f, const Walls& walls, std::uint64_t seed) {
   const int a = 1 + static_cast<int>(seed / 8 % 3), b = 1 + static_cast<int>(seed / 24 % 3);
   const std::vector<int> plan = {a, b, run_substeps - a - b};
@@ -197,14 +197,14 @@ const std::vector<Property>& properties() {
       {"substep", "one substep moves every particle as the oracle moves it", 1, true},
       {"contact", "walls push and rub as the oracle's do, whatever led to the contact", 2, true},
       {"advanced", "fields of what a run leaves in use are the oracle's at the state it ends in", 2, true},
-      {"conservation", "forces between fluid particles add up to nothing", 1, true},
+      {"conservation", "forces between fluid particles sum to zero", 1, true},
       {"mass", "every particle is there once, finite, in one place", 4, true},
       {"containment", "no particle gets deeper into a wall than the oracle's own run shows", 4, true},
       {"determinism", "the same again gives the same bits", 4, true},
-      {"invariance", "ids permuted, everything moved, everything turned: the same answer", 4, true},
+      {"invariance", "ids permuted, everything translated, everything rotated: the same answer", 4, true},
       {"trajectory", "a short run ends where the oracle's ends, as near as rounding lets runs end", 8, true},
-      {"status", "trouble that is made is reported, with its particle and substep", 8, true},
-      {"sequence", "parts of a run, looks and loads in between, end where one run ends", 8, true},
+      {"status", "errors that are provoked are reported, with particle and substep", 8, true},
+      {"sequence", "parts of a run, reads and loads in between, end where one run ends", 8, true},
       {"lists", "a list that rebuilds by displacement misses no pair at any substep", 4, true},
       {"round-trip", "a scene comes back from its file as it was", 1, false},
       {"refusal", "a scene with one thing wrong is refused and the key named", 1, false},

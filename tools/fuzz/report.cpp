@@ -30,7 +30,7 @@ std::vector<std::string> texts(const Rows& rows, Get get) {
 
 std::string campaign_table(const Campaign& c) {
   std::string text = fmt::format(
-      "{} problems of seeds {} to {} in {:.1f} s, {:.0f} a second; {} with pairs so near H that fp32\n"
+      "{} problems of seeds {} to {} in {:.1f} s, {:.0f} per second; {} with pairs so near H that fp32\n"
       "cannot tell who is a neighbor\n\nshare of problems with",
       c.cases, c.first_seed, c.first_seed + static_cast<std::uint64_t>(c.cases) - 1, c.seconds,
       static_cast<double>(c.cases) / c.seconds, c.undecidable);
@@ -45,7 +45,7 @@ std::string campaign_table(const Campaign& c) {
                         t.worst, t.worst_seed, t.worst_field);
   for (const Finding& f : c.findings)
     text += fmt::format(
-        "\nseed {}: {} does not hold for {}\n  {}\n  shrunk in {} tries from {} particles to {}\n{}", f.seed,
+        "\nseed {}: {} does not hold for {}\n  {}\n  minimised in {} tries from {} particles to {}\n{}", f.seed,
         f.outcome.property, f.outcome.backend, f.outcome.reason, f.tries, f.found_particles, describe(f.genome),
         f.file.empty() ? "" : fmt::format("  decant conform {} --backend {}\n", f.file, f.outcome.backend));
   return text;
