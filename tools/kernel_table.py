@@ -6,6 +6,8 @@ import csv
 import re
 import sys
 
+from one_line import run_main
+
 COLUMNS = [  # heading, metric, scale
     ("us", "gpu__time_duration.sum", 1e-3),
     ("registers", "launch__registers_per_thread", 1),
@@ -46,4 +48,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)

@@ -11,6 +11,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 from option_names import current
+from one_line import run_main
 
 STAGES = ["build", "density", "force", "integrate"]
 COLORS = ["#4c78a8", "#f58518", "#54a24b", "#b279a2"]
@@ -69,4 +70,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)

@@ -17,6 +17,8 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 
+from one_line import run_main  # noqa: E402
+
 PLACES = ("source", "in_flight", "receiver", "spilled", "lost")
 INK = "#26303a"
 
@@ -39,13 +41,13 @@ def cross_section(vertex, triangle, y=0.0):
     return points[np.isfinite(points[:, :, 0])].reshape(-1, 2, 2)
 
 
-def wall_segments(file, frame):
-    """Segments of every container at one frame."""
+def wall_segments(file, frame, y):
+    """Segments of every container at one frame, in the plane at height y."""
     found = []
     for wall in file.get("walls", {}).values():
         vertex = wall["vertex"]
         at = vertex[frame] if vertex.ndim == 3 else vertex[:]
-        found.append(cross_section(at.astype(float), wall["triangle"][:]))
+        found.append(cross_section(at.astype(float), wall["triangle"][:], y))
     return found
 
 
@@ -66,8 +68,14 @@ def draw_phases(folder, out, times, count, slab, dpi):
         time = file["time"][:]
         position = [file["fluid/position"][f] for f in chosen]
         speed = [np.linalg.norm(file["fluid/velocity"][f], axis=1) for f in chosen]
-        walls = [wall_segments(file, f) for f in chosen]
+        walls = [wall_segments(file, f, 0.0) for f in chosen]
+        if not any(len(s) for w in walls for s in w):  # a scene beside the plane: cut it where the fluid is
+            y = float(np.median(np.concatenate(position)[:, 1]))
+            walls = [wall_segments(file, f, y) for f in chosen]
     everything = [p[:, (0, 2)] for p in position] + [s.reshape(-1, 2) for w in walls for s in w]
+    everything = [e for e in everything if len(e)]
+    if not everything:
+        sys.exit("render_pour: no particle and no wall to draw")
     low = np.min([e.min(axis=0) for e in everything], axis=0)
     high = np.max([e.max(axis=0) for e in everything], axis=0)
     margin = 0.04 * (high - low).max()
@@ -169,4 +177,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)

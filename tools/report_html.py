@@ -17,6 +17,8 @@ import h5py
 
 from report_plots import distribution_plot, slice_plot, three_way_plot
 
+from one_line import run_main
+
 MOST_FAILING = 200  # rows told in full; the report has all
 
 DISTRIBUTION_CAPTION = (
@@ -311,4 +313,4 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_main(main)

@@ -14,6 +14,8 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
+from one_line import run_main  # noqa: E402
+
 COLORS = ["#4c78a8", "#e45756", "#54a24b", "#b279a2", "#f58518", "#72b7b2", "#9d755d"]
 STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:1080px;margin:2em auto;padding:0 1em;color:#222}
 table{border-collapse:collapse;font-size:13px;margin:.6em 0}td,th{padding:.15em .7em;text-align:right;
@@ -191,4 +193,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)
