@@ -140,7 +140,7 @@ struct Floor {
 
 /// Where particles may be. Leaving it is an error on a free axis and a wrap on a periodic one.
 struct Domain {
-  Vec3 min, max;  // m
+  Vec3 min = Vec3::Zero(), max = Vec3::Zero();  // m
   std::array<bool, 3> periodic = {false, false, false};
 };
 
