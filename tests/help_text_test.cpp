@@ -2,11 +2,10 @@
 /// Help that fits 80 columns, and answers to a command line with a slip in it.
 #include "tools/help_text.hpp"
 
+#include "tests/shell_output.hpp"
+
 #include <gtest/gtest.h>
 
-#include <sys/wait.h>
-
-#include <cstdio>
 #include <string>
 #include <vector>
 
@@ -33,22 +32,12 @@ TEST(NearestName, IsTheOneThatWasMeantOrNone) {
   EXPECT_EQ(nearest_name("", verbs), "");
 }
 
-struct Answer {
-  int status;
-  std::string text;
-};
-
-Answer answer_to(const std::string& arguments) {
-  std::FILE* pipe = ::popen(("'" DECANT_COMMAND "' " + arguments + " 2>&1").c_str(), "r");
-  Answer a{0, ""};
-  for (int c; (c = std::fgetc(pipe)) != EOF;) a.text += static_cast<char>(c);
-  const int status = ::pclose(pipe);
-  a.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  return a;
+test::ShellOutput answer_to(const std::string& arguments) {
+  return test::shell_output("'" DECANT_COMMAND "' " + arguments);
 }
 
 TEST(Command, HelpOfEveryVerbFitsTheTerminalAndHasAnExample) {
-  const Answer all = answer_to("--help");
+  const test::ShellOutput all = answer_to("--help");
   std::vector<std::string> verbs{""};
   for (std::size_t at = all.text.find("Subcommands:"); (at = all.text.find("\n  ", at)) != std::string::npos;) {
     at += 3;
@@ -58,7 +47,7 @@ TEST(Command, HelpOfEveryVerbFitsTheTerminalAndHasAnExample) {
   }
   EXPECT_EQ(verbs.size(), 11);
   for (const std::string& verb : verbs) {
-    const Answer help = answer_to(verb + " --help");
+    const test::ShellOutput help = answer_to(verb + " --help");
     EXPECT_EQ(help.status, 0) << verb;
     EXPECT_NE(help.text.find("\n  decant "), std::string::npos) << verb << " has no example";
     std::size_t from = 0;
@@ -73,10 +62,10 @@ TEST(Command, HelpOfEveryVerbFitsTheTerminalAndHasAnExample) {
 TEST(Command, SaysWhatWasProbablyMeant) {
   EXPECT_EQ(answer_to("").status, 2);
   EXPECT_NE(answer_to("").text.find("conform"), std::string::npos);
-  const Answer verb = answer_to("confrom");
+  const test::ShellOutput verb = answer_to("confrom");
   EXPECT_EQ(verb.status, 2);
   EXPECT_EQ(verb.text, "decant: 'confrom' is no command; did you mean conform? (decant --help lists them)\n");
-  const Answer option = answer_to("conform --backnd brute");
+  const test::ShellOutput option = answer_to("conform --backnd brute");
   EXPECT_EQ(option.status, 2);
   EXPECT_EQ(option.text, "decant: conform: --backnd is no option; did you mean --backend? (decant conform --help)\n");
   for (const char* version : {"--version", "-V", "version"}) EXPECT_EQ(answer_to(version).status, 0) << version;
@@ -87,7 +76,7 @@ TEST(Command, SaysWhatWasProbablyMeant) {
 TEST(Command, FindsRecordingsByName) {
   EXPECT_EQ(answer_to("conform hostile-empty --backend hash --quiet").status, 0);
   EXPECT_EQ(answer_to("conform no-such-state --backend hash --quiet").status, 2);
-  const Answer list = answer_to("conform --list");
+  const test::ShellOutput list = answer_to("conform --list");
   EXPECT_NE(list.text.find("\nhostile-empty\n"), std::string::npos);
   EXPECT_NE(list.text.find("pour-56k-stream  (with --all)\n"), std::string::npos);
 }

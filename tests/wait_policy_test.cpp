@@ -1,24 +1,15 @@
 /// \file
 /// The command's waiting threads sleep, unless its user says otherwise.
+#include "tests/shell_output.hpp"
+
 #include <gtest/gtest.h>
 
-#include <array>
-#include <cstdio>
-#include <memory>
 #include <string>
 
 namespace decant {
 namespace {
 
-/// What a shell command prints, errors included.
-std::string output_of(const std::string& command) {
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(::popen(("{ " + command + "; } 2>&1").c_str(), "r"),
-                                                             &::pclose);
-  std::string text;
-  std::array<char, 4096> part;
-  while (const std::size_t size = std::fread(part.data(), 1, part.size(), pipe.get())) text.append(part.data(), size);
-  return text;
-}
+std::string output_of(const std::string& command) { return test::shell_output(command).text; }
 
 /// What the OpenMP runtime says that it does, the last time that it says so.
 std::string policy_told(const std::string& settings) {
