@@ -45,10 +45,6 @@ def bench(name):
     return data["rows"], source(path, device, data["provenance"]["git_revision"])
 
 
-def choice(row):
-    return "`" + ":".join(filter(None, [row["backend"], current(row["options"])])) + "`"
-
-
 def renamed(backend):
     name, _, options = backend.partition(":")
     return ":".join(filter(None, [name, current(options)]))
@@ -114,7 +110,7 @@ LADDER = [
 
 def substep_times():
     rows, where = bench("bench")
-    times = {(choice(r).strip("`"), r["window"]): r["substep_us"] for r in rows}
+    times = {(renamed(f"{r['backend']}:{r['options']}"), r["window"]): r["substep_us"] for r in rows}
     shown = [
         [f"`{name}`", what, *(significant(times[name, w]) if (name, w) in times else "" for w in ("stream", "filling"))]
         for name, what in LADDER
