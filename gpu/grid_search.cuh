@@ -16,6 +16,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace decant::gpu::DECANT_EXECUTOR {
 
@@ -27,8 +28,11 @@ class GridSearch {
 
   void load(Queue& queue, const Constants& c, const Arrays& a, const WallStore& walls,
             const Box& region) {
+    // The same scene over again keeps the room that it is known to need.
+    const bool again = n_ == a.n && c_.H == c.H && std::memcmp(&region_, &region, sizeof region) == 0;
     c_ = c;
     n_ = a.n;
+    region_ = region;
     walls_ = walls;
     widest_skin_ = !reuses_ ? 0.0f : static_cast<float>(o_.skin < 0 ? widest : o_.skin) * c.H;
     reach_ = c.H + widest_skin_;
@@ -41,11 +45,13 @@ class GridSearch {
                    {walls_have_cells(), !reuses_ && o_.source == SolverOptions::Source::rebuilt,
                     !large(), reach_},
                    scratch_);
-    // Whatever was loaded before: a run has the lists that its own problem makes it have.
-    const double ratio = !reuses_ ? 1 : 1 + (o_.skin < 0 ? usual : o_.skin);
-    capacity_ = o_.capacity ? o_.capacity
-                            : static_cast<int>(std::ceil(41 * ratio * ratio * ratio / lanes_));
-    if (!o_.capacity && lanes_ > 1) capacity_ += 4;
+    if (!again || capacity_ == 0) {
+      // Whatever was loaded before: a run has the lists that its own problem makes it have.
+      const double ratio = !reuses_ ? 1 : 1 + (o_.skin < 0 ? usual : o_.skin);
+      capacity_ = o_.capacity ? o_.capacity
+                              : static_cast<int>(std::ceil(41 * ratio * ratio * ratio / lanes_));
+      if (!o_.capacity && lanes_ > 1) capacity_ += 4;
+    }
     reserve_lists();
   }
 
@@ -315,6 +321,7 @@ class GridSearch {
   SolverOptions o_;
   bool reuses_;
   Constants c_{};
+  Box region_{};
   int n_ = 0, lanes_ = 1, capacity_ = 0;
   float reach_ = 0, widest_skin_ = 0;
   bool sort_fluid_ = true;

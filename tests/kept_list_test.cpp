@@ -56,6 +56,28 @@ TEST_P(KeptList, ThatOverflowsInARunLeavesTheBitsThatAmpleRoomLeaves) {
   }
 }
 
+/// A run from the same scene, loaded again, has the room that the first one found; another scene starts afresh.
+TEST_P(KeptList, KeepsItsRoomForTheSameSceneAlone) {
+  const Fixture gathering = read_fixture(DECANT_SOURCE_DIR "/fixtures/hostile-gathering.h5");
+  const Fixture other = read_fixture(DECANT_SOURCE_DIR "/fixtures/hostile-crowd.h5");
+  for (const std::string name : {"hash", "list"}) {
+    const auto backend = make(name);
+    const auto loaded = [&](const Fixture& f) {
+      backend->load(f.scene, sample_walls(f.scene), f.state);
+      return backend->neighbor_stats().device_bytes;
+    };
+    const auto first = loaded(gathering);
+    EXPECT_TRUE(backend->advance(24).ok()) << name;
+    const auto grown = backend->neighbor_stats().device_bytes;
+    EXPECT_GT(grown, first) << name;
+    EXPECT_EQ(loaded(gathering), grown) << name;
+    loaded(other);
+    const auto afresh = loaded(gathering);
+    EXPECT_TRUE(backend->advance(24).ok()) << name;
+    EXPECT_GT(backend->neighbor_stats().device_bytes, afresh) << name;
+  }
+}
+
 /// Points a lattice spacing apart that fly the same way, in the open, with nothing that pulls at them.
 Fixture flight(const Vec3& velocity) {
   Fixture f = test::random_fixture(3);
