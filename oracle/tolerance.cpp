@@ -11,6 +11,9 @@
 #include "reference/pose.hpp"
 #include "reference/solver.hpp"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -82,6 +85,22 @@ class Bounds {
   OracleAnswer take() { return std::move(answer_); }
 
  private:
+  /// What the bounds of one particle are put together in; memory is kept from one to the next.
+  struct Scratch {
+    SumBound terms;
+    CellCounter cells;
+    ForceBounds pressure, viscous, wall_pressure, wall_viscous;
+  };
+  /// one(i, scratch) for all particles, on all cores: a particle's bounds are its own, and so are the bits that
+  /// they come out with, whatever the number of threads.
+  template <class One>
+  static void for_particles(Eigen::Index n, One one) {
+    tbb::parallel_for(tbb::blocked_range<Eigen::Index>(0, n, 256), [&](const auto& range) {
+      Scratch scratch;
+      for (Eigen::Index i = range.begin(); i < range.end(); ++i) one(i, scratch);
+    });
+  }
+
   /// By axis, of images with x_ij > 0 and with x_ij < 0.
   using Sides = Eigen::Matrix<double, 3, 2>;
   /// \param straight  x_i − x_j; \param x_ij  by the nearest image, m; \param per_length  Σ's term by |x_ij|
@@ -105,10 +124,10 @@ class Bounds {
     C.density_pose.setZero(n);
     tau_q_.setZero(n);
     in_common_q_.setZero(periodic_ ? 11 : 5, n);
-    SumBound terms;
     // A shell of half-width d about H holds 6 d/H of the pairs inside H where the fluid is uniform.
-    double ambiguous_fluid = 0, ambiguous_wall = 0;
-    for (Eigen::Index i = 0; i < n; ++i) {
+    Eigen::VectorXd ambiguous_fluid = Eigen::VectorXd::Zero(n), ambiguous_wall = Eigen::VectorXd::Zero(n);
+    for_particles(n, [&](Eigen::Index i, Scratch& scratch) {
+      SumBound& terms = scratch.terms;
       const Vec3 x_i = state_.position.col(i);
       const auto& fluid = near_.fluid[static_cast<std::size_t>(i)];
       const auto& wall = near_.wall[static_cast<std::size_t>(i)];
@@ -129,7 +148,7 @@ class Bounds {
         const Vec3 e = pair_error(x_i, x_j, x_ij, H_, u);
         misplaced += slope * along(x_ij, r, e);
         if (periodic_ && r > 0) add_images(x_i - x_j, x_ij, slope / r * e, images);
-        ambiguous_fluid += 6 * margin(e) / H_;
+        ambiguous_fluid[i] += 6 * margin(e) / H_;
       }
       for (const auto b : wall) {
         const Vec3 x_b = posed_.position.col(b), x_ib = separation_(x_i, x_b);
@@ -142,7 +161,7 @@ class Bounds {
         pose += slope * std::max(pose_.largest[b], image_magnitude(x_i, x_b, x_ib));
         const Vec3 e = wall_error(b, x_i, x_b, x_ib);
         misplaced += slope * along(x_ib, r, e);
-        ambiguous_wall += 6 * margin(e) / H_;
+        ambiguous_wall[i] += 6 * margin(e) / H_;
         if (r > 0) displaced += slope / r * x_ib.cwiseProduct(e);
         if (periodic_ && r > 0) add_images(x_i - x_b, x_ib, slope / r * e, images);
         from_volumes += rho0 * answer_.tolerance.boundary_volume[b] * W;
@@ -154,11 +173,11 @@ class Bounds {
       C.density[i] = sum;
       C.density_pose[i] = pose;
       answer_.tolerance.density[i] =
-          terms.error(u, u * (inside + std::abs(by_H)), cells_) + misplaced + from_volumes + from_edge;
+          terms.error(u, u * (inside + std::abs(by_H)), scratch.cells) + misplaced + from_volumes + from_edge;
       pressure_bounds(i, displaced, from_volumes, images);
-    }
-    answer_.most_fluid_ambiguous = static_cast<std::int64_t>(std::ceil(4 * ambiguous_fluid)) + 10;
-    answer_.most_wall_ambiguous = static_cast<std::int64_t>(std::ceil(4 * ambiguous_wall)) + 10;
+    });
+    answer_.most_fluid_ambiguous = static_cast<std::int64_t>(std::ceil(4 * ambiguous_fluid.sum())) + 10;
+    answer_.most_wall_ambiguous = static_cast<std::int64_t>(std::ceil(4 * ambiguous_wall.sum())) + 10;
   }
 
   /// Pressure follows from the backend's own density unless density is given.
@@ -208,8 +227,8 @@ class Bounds {
     rho_off_.setZero(n);
     if (!(given_ && given_->density.size()))
       rho_off_ = answer_.tolerance.density.array() / answer_.fields.density.array();
-    ForceBounds pressure, viscous, wall_pressure, wall_viscous;
-    for (Eigen::Index i = 0; i < n; ++i) {
+    for_particles(n, [&](Eigen::Index i, Scratch& scratch) {
+      auto& [terms, cells, pressure, viscous, wall_pressure, wall_viscous] = scratch;
       for (ForceBounds* part : {&pressure, &viscous, &wall_pressure, &wall_viscous}) part->clear();
       fluid_bounds(i, near_.fluid[static_cast<std::size_t>(i)], pressure, viscous);
       wall_bounds(i, near_.wall[static_cast<std::size_t>(i)], wall_pressure, wall_viscous);
@@ -222,16 +241,16 @@ class Bounds {
       C.viscous_acceleration.col(i) = viscous.condition;
       C.wall_pressure_acceleration.col(i) = wall_pressure.condition;
       C.wall_viscous_acceleration.col(i) = wall_viscous.condition;
-      T.pressure_acceleration.col(i) = pressure.tolerance(tau_q_[i], cells_);
-      T.viscous_acceleration.col(i) = viscous.tolerance(0, cells_);
-      T.wall_pressure_acceleration.col(i) = wall_pressure.tolerance(tau_q_[i], cells_);
-      T.wall_viscous_acceleration.col(i) = wall_viscous.tolerance(0, cells_);
+      T.pressure_acceleration.col(i) = pressure.tolerance(tau_q_[i], cells);
+      T.viscous_acceleration.col(i) = viscous.tolerance(0, cells);
+      T.wall_pressure_acceleration.col(i) = wall_pressure.tolerance(tau_q_[i], cells);
+      T.wall_viscous_acceleration.col(i) = wall_viscous.tolerance(0, cells);
       // Gravity is a term like any other: a register may start from it.
       ((pressure += viscous) += wall_pressure) += wall_viscous;
       pressure.add(scene_.gravity);
       pressure.inside += scene_.gravity.cwiseAbs();
-      T.acceleration.col(i) = pressure.tolerance(tau_q_[i], cells_);
-    }
+      T.acceleration.col(i) = pressure.tolerance(tau_q_[i], cells);
+    });
   }
 
   void fluid_bounds(Eigen::Index i, const std::vector<std::int32_t>& ids, ForceBounds& pressure,
@@ -345,22 +364,25 @@ class Bounds {
     answer_.fluid_ambiguous.assign(n, false);
     answer_.wall_ambiguous.assign(n, false);
     const bool exact = exact_distances();
-    for (std::size_t i = 0; i < n; ++i) {
-      const Vec3 x_i = state_.position.col(static_cast<Eigen::Index>(i));
+    for_particles(state_.size(), [&](Eigen::Index particle, Scratch&) {
+      const auto i = static_cast<std::size_t>(particle);
+      const Vec3 x_i = state_.position.col(particle);
       for (const auto j : near_H.fluid[i]) {
         const Vec3 x_j = state_.position.col(j), x_ij = separation_(x_i, x_j);
         const double r = x_ij.norm(), off = margin(pair_error(x_i, x_j, x_ij, H_, u));
         if (exact || std::abs(r - H_) > off) continue;
-        answer_.fluid_ambiguous[i] = true;
         edge_fluid_[i].push_back({j, std::min(r, H_) - off});
       }
       for (const auto b : near_H.wall[i]) {
         const Vec3 x_b = posed_.position.col(b), x_ib = separation_(x_i, x_b);
         const double r = x_ib.norm(), off = margin(wall_error(b, x_i, x_b, x_ib));
         if (std::abs(r - H_) > off) continue;
-        answer_.wall_ambiguous[i] = true;
         edge_wall_[i].push_back({b, std::min(r, H_) - off});
       }
+    });
+    for (std::size_t i = 0; i < n; ++i) {
+      answer_.fluid_ambiguous[i] = !edge_fluid_[i].empty();
+      answer_.wall_ambiguous[i] = !edge_wall_[i].empty();
     }
   }
 
@@ -376,7 +398,6 @@ class Bounds {
   CommonRoundings common_;
   Eigen::VectorXd rho_, rho_off_, q_, tau_q_;  // rho_off: tau_rho / rho
   Eigen::MatrixXd in_common_q_;  // how far all q shift together, by cause, the last six on periodic axes alone
-  CellCounter cells_;
   Neighbors near_;
   /// A pair near H, and the least distance that fp32 may find.
   struct Edge {
