@@ -110,7 +110,7 @@ def block(rng, counts, corner, apart=0.0042):
     return (x + rng.uniform(-0.1, 0.1, x.shape)) * apart + corner
 
 
-def flying(rng):
+def flying(rng, fixtures):
     """(name, scene, time, positions, velocities): states that need velocities of their own."""
     bouncing = block(rng, (6, 6, 4), [0.13, -0.008, 0.004])
     yield "bounce", "hostile-bounce", 0.0, bouncing, np.broadcast_to([0.4, 0.0, -2.2], bouncing.shape)
@@ -122,6 +122,31 @@ def flying(rng):
     # As beside the fast wall, where it still moves by a small part of the skin in a substep.
     beside = block(rng, (4, 6, 5), [0.0365, -0.013, 0.012], 0.0052)
     yield "slow-wall", "hostile-fast-wall", 0.002, beside, np.zeros_like(beside)
+
+    # What lists, of 5 substeps' way at this speed, have to find at the end of their time. Pairs that meet
+    # head-on, far enough apart to be unlisted where lists are used too long; where one of them is when lists are made,
+    # a slow particle.
+    speed, dt = 2.5, 0.01 / 141
+    middle = block(rng, (3, 3, 3), [0.06, -0.024, -0.02], 0.03)
+    diagonal = np.ones(3) / 3**0.5
+    half = 0.5 * (0.0116 + rng.uniform(-0.0001, 0.0001, (27, 1)))
+    meeting = np.concatenate([middle - half * diagonal, middle + half * diagonal,
+                              middle + (half - 5.85 * speed * dt) * diagonal + [0.00003, -0.00003, 0.0]])
+    towards = np.repeat([speed, -speed, -0.1 * speed], 27)[:, None] * diagonal
+    # And a sheet that leaves a cell of 0.6 H, as lists of walls have it, towards particles H beyond the cell.
+    wall = scene_of(fixtures, "hostile-impact")["containers"][0]
+    y, z = [g.ravel() for g in np.meshgrid((np.arange(0, 13, 2) + 0.5) * 0.05 / 13, np.arange(5) * 0.0085 + 0.01)]
+    x = 0.0192003 - 25.5 * 0.5 * speed * dt - rng.uniform(0.00002, 0.00015, y.size)
+    sheet = np.stack([x, y, z], -1) + wall["origin"]
+    yield ("impact", "hostile-impact", 0.0, np.concatenate([meeting, sheet]),
+           np.concatenate([towards, np.broadcast_to([0.5 * speed, 0.0, 0.0], sheet.shape)]))
+
+    # What is sought from where it is, and lies in the cell of where it will be, which is three cells of 0.6 H away.
+    angle = np.concatenate([a + rng.uniform(-0.1, 0.1, 13) for a in (0.0, np.pi)])
+    outwards = np.stack([np.cos(angle), np.sin(angle), np.zeros(26)], -1)
+    height = np.tile(np.linspace(-0.018, 0.018, 13), 2)[:, None] * [0.0, 0.0, 1.0]
+    pairs = [0.00036, 0.0, 0.0] + (0.004516 - 4 * 1.45 * 0.01 / 135) * outwards + height
+    yield "rebound", "hostile-rebound", 0.0, pairs, 1.45 * outwards
 
 
 def states(rng):
@@ -193,7 +218,7 @@ def problems(fixtures):
         yield name, scene, time, position, velocity
     for name, time, position in astray(np.random.default_rng(19), fixtures):
         yield name, f"hostile-{name}", time, position, np.random.default_rng(7).uniform(-0.2, 0.2, position.shape)
-    yield from flying(np.random.default_rng(8))
+    yield from flying(np.random.default_rng(8), fixtures)
 
 
 def main():

@@ -11,6 +11,7 @@ HELDOUT = []
 
 # What shows with a backend's options only.
 OPTIONS = {
+    "list-origins-not-predicted": "list:skin=0.2",
     "clearance-of-last-container": "list:criterion=relative",
     "largest-component-of-approach": "list:criterion=relative",
     "negative-floats-misordered": "list:criterion=relative",
