@@ -1,9 +1,10 @@
 /// \file
 /// The backend of gpu/ADD_A_BACKEND.md is judged like those of the table.
+#include "oracle/files/fixture_file.hpp"
 #include "tests/slab_search.cuh"
 
 #include "gpu/backends.hpp"
-#include "oracle/conform.hpp"
+#include "oracle/checks/conform.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 /// \file
 /// Where the audit says water is, and what it calls a way through a wall, against states whose
 /// answer is plain.
-#include "oracle/audit.hpp"
+#include "oracle/checks/audit.hpp"
 #include "reference/pose.hpp"
 #include "tests/falling_points.hpp"
 #include "tests/generators.hpp"

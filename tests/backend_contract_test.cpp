@@ -5,7 +5,7 @@
 #include "tests/random_scene.hpp"
 
 #include "gpu/backends.hpp"
-#include "oracle/reference_backend.hpp"
+#include "oracle/solution/reference_backend.hpp"
 #include "reference/error.hpp"
 
 #include <gtest/gtest.h>

@@ -1,17 +1,18 @@
 /// \file
 /// Recorded fixtures are still what the reference says, and backends conform on them and on random
 /// scenes nobody chose.
-#include "oracle/conform.hpp"
-#include "oracle/stale_list.hpp"
+#include "oracle/checks/conform.hpp"
+#include "oracle/files/fixture_file.hpp"
+#include "oracle/lists/stale_list.hpp"
 #include "tests/backend_variants.hpp"
 #include "tests/random_scene.hpp"
 
 #include "gpu/backends.hpp"
-#include "oracle/reference_backend.hpp"
+#include "oracle/solution/reference_backend.hpp"
 #include "reference/distance.hpp"
 #include "reference/error.hpp"
 #include "reference/pose.hpp"
-#include "tools/fixture_folder.hpp"
+#include "tools/commands/fixture_folder.hpp"
 
 #include <gtest/gtest.h>
 

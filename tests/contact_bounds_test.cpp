@@ -1,8 +1,8 @@
 /// \file
 /// Contact in single precision, in every form that is as good as another, stays within its bounds; what is
 /// wrong by a thousandth does not.
-#include "oracle/contact_bounds.hpp"
-#include "oracle/field_checks.hpp"
+#include "oracle/solution/contact_bounds.hpp"
+#include "oracle/checks/field_checks.hpp"
 #include "reference/shapes.hpp"
 
 #include <gtest/gtest.h>

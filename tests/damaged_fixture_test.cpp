@@ -1,5 +1,7 @@
 /// \file
 /// A damaged or hostile fixture is refused by name; it never crashes and never passes.
+#include "oracle/files/fixture_file.hpp"
+#include "oracle/solution/digest.hpp"
 #include "tests/small_fixture.hpp"
 
 #include <cmath>

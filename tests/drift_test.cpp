@@ -1,14 +1,15 @@
 /// \file
 /// The sweep over intervals and skins, on recorded pours and a small budget.
 #include "tools/drift/drift.hpp"
+#include "oracle/files/fixture_file.hpp"
 
-#include "oracle/hdf5_io.hpp"
+#include "oracle/files/hdf5_io.hpp"
 #include "reference/error.hpp"
 #include "reference/sampling.hpp"
 #include "tests/falling_points.hpp"
 #include "tests/python.hpp"
 #include "tests/random_scene.hpp"
-#include "tools/backend_choice.hpp"
+#include "tools/commands/backend_choice.hpp"
 
 #include <gtest/gtest.h>
 
@@ -218,7 +219,7 @@ TEST(Drift, ReportIsAsDocumented) {
   PourDrift pour{"scene", {{0.5, measured().samples[3]}}, {WholePour{}}};
   for (const auto& pours : {std::vector<PourDrift>{}, std::vector{pour}}) {
     write_drift(file, {measured()}, pours, {"list", "", "host", "here", "fp32"});
-    EXPECT_EQ(test::run_python({DECANT_SOURCE_DIR "/tools/check_schema.py", file.string()}), 0);
+    EXPECT_EQ(test::run_python({DECANT_SOURCE_DIR "/tools/python/check_schema.py", file.string()}), 0);
   }
   const std::string table = drift_table({measured()});
   EXPECT_NE(table.find("safe interval"), std::string::npos);

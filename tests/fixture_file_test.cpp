@@ -1,5 +1,7 @@
 /// \file
 /// Fixtures come back bitwise and are as their document says.
+#include "oracle/files/fixture_file.hpp"
+#include "oracle/solution/digest.hpp"
 #include "tests/small_fixture.hpp"
 
 #include <limits>

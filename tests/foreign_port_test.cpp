@@ -1,7 +1,7 @@
 /// \file
 /// A port in another language: the example conforms, each of its faults fails the check that is
 /// there for it, and the Python writers give what the documents say.
-#include "oracle/port_inputs.hpp"
+#include "oracle/files/port_inputs.hpp"
 #include "tests/python.hpp"
 #include "tests/results_fixture.hpp"
 
@@ -14,7 +14,7 @@ namespace {
 const std::string root = DECANT_SOURCE_DIR;
 
 int schema_of(const std::filesystem::path& file) {
-  return test::run_python({root + "/tools/check_schema.py", file.string()});
+  return test::run_python({root + "/tools/python/check_schema.py", file.string()});
 }
 
 class ForeignPort : public test::ResultsFile {
@@ -26,8 +26,8 @@ class ForeignPort : public test::ResultsFile {
   }
   static std::filesystem::path inputs_file() { return *folder_ / "inputs.h5"; }
   static int run_port(const std::string& fault) {
-    return test::run_python(
-        {root + "/tools/numpy_port.py", inputs_file().string(), "--out", results_file().string(), "--fault", fault});
+    return test::run_python({root + "/tools/python/numpy_port.py", inputs_file().string(), "--out",
+                             results_file().string(), "--fault", fault});
   }
 };
 
@@ -132,7 +132,8 @@ with h5py.File(sys.argv[1], "w", libver=("earliest", "v108")) as file:
 )";
   const auto plain = *folder_ / "plain.h5";
   ASSERT_EQ(test::run_python({script.string(), plain.string(), std::to_string(fixture_->state.size())}), 0);
-  ASSERT_EQ(test::run_python({root + "/tools/results_file.py", plain.string(), "--out", results_file().string()}), 0);
+  ASSERT_EQ(
+      test::run_python({root + "/tools/python/results_file.py", plain.string(), "--out", results_file().string()}), 0);
   EXPECT_EQ(judged().status, 3) << "is read, and gives nothing";
 }
 

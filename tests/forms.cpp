@@ -2,8 +2,8 @@
 /// Written out step by step in float. What is summed is kept as factors, so that a sum can be fused.
 #include "tests/forms.hpp"
 
-#include "oracle/comparison.hpp"
-#include "oracle/field_checks.hpp"
+#include "oracle/checks/comparison.hpp"
+#include "oracle/checks/field_checks.hpp"
 #include "reference/neighbors.hpp"
 #include "reference/pose.hpp"
 #include "reference/solver.hpp"

@@ -4,8 +4,8 @@
 /// legal; none may exceed a tolerance.
 #pragma once
 
-#include "oracle/fixture.hpp"
-#include "oracle/tolerance.hpp"
+#include "oracle/solution/fixture.hpp"
+#include "oracle/solution/tolerance.hpp"
 
 #include <map>
 #include <random>

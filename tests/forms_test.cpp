@@ -2,6 +2,7 @@
 /// A few of the legal forms of tests/studies/forms.cpp, on every build: none exceeds a tolerance, and the
 /// evaluator they are written in is not so loose that a fault would pass.
 #include "tests/forms.hpp"
+#include "oracle/files/fixture_file.hpp"
 
 #include "reference/sampling.hpp"
 

@@ -1,11 +1,11 @@
 /// \file
 /// What a frame looks like on the disk: HDF5, CSV, XDMF, and the thread that puts it there.
-#include "tools/frame_writer.hpp"
+#include "tools/frames/frame_writer.hpp"
 
-#include "oracle/hdf5_io.hpp"
+#include "oracle/files/hdf5_io.hpp"
 #include "reference/error.hpp"
 #include "tests/falling_points.hpp"
-#include "tools/xdmf.hpp"
+#include "tools/frames/xdmf.hpp"
 
 #include <gtest/gtest.h>
 

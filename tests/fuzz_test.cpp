@@ -1,17 +1,18 @@
 /// \file
 /// Fuzzing itself: problems are sound and of all kinds, faults are found and shrunk, campaigns are the
 /// same however they are run.
+#include "oracle/files/fixture_file.hpp"
 #include "tools/fuzz/campaign.hpp"
 
-#include "oracle/conform.hpp"
-#include "oracle/hdf5_io.hpp"
-#include "oracle/reference_backend.hpp"
+#include "oracle/checks/conform.hpp"
+#include "oracle/files/hdf5_io.hpp"
+#include "oracle/solution/reference_backend.hpp"
 #include "reference/error.hpp"
 #include "reference/scene_checks.hpp"
 #include "tests/edited_reference.hpp"
 #include "tests/falling_points.hpp"
 #include "tests/python.hpp"
-#include "tools/backend_choice.hpp"
+#include "tools/commands/backend_choice.hpp"
 
 #include <gtest/gtest.h>
 

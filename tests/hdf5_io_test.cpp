@@ -1,6 +1,6 @@
 /// \file
 /// Files appear whole or not at all, come back bitwise, and are never believed.
-#include "oracle/hdf5_io.hpp"
+#include "oracle/files/hdf5_io.hpp"
 #include "reference/error.hpp"
 
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
 /// \file
 /// Help that fits 80 columns, and answers to a command line with a slip in it.
-#include "tools/help_text.hpp"
+#include "tools/commands/help_text.hpp"
 
 #include "tests/shell_output.hpp"
 

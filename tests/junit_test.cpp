@@ -1,8 +1,8 @@
 /// \file
 /// What CI systems are told: every failing check fails there, and what did not run is no pass.
-#include "tools/junit.hpp"
+#include "tools/commands/junit.hpp"
 
-#include "oracle/file_aside.hpp"
+#include "oracle/files/file_aside.hpp"
 #include "tests/falling_points.hpp"
 #include "tests/python.hpp"
 

@@ -1,11 +1,12 @@
 /// \file
 /// Lists that are kept while particles move: made for the places where particles are going to be, they
 /// serve twice as long and still miss nothing. And what a particle's distance from the walls spares.
+#include "oracle/files/fixture_file.hpp"
 #include "tests/backend_variants.hpp"
 #include "tests/falling_points.hpp"
 #include "tests/random_scene.hpp"
 
-#include "oracle/reference_backend.hpp"
+#include "oracle/solution/reference_backend.hpp"
 #include "reference/initial_state.hpp"
 #include "reference/sampling.hpp"
 #include "reference/scene_checks.hpp"

@@ -1,7 +1,7 @@
 /// \file
 /// What walls that translate and turn do to fluid: a piston's work, what it pushes, a tank and a drum
 /// that carry their fluid along.
-#include "oracle/audit.hpp"
+#include "oracle/checks/audit.hpp"
 #include "reference/initial_state.hpp"
 #include "reference/sampling.hpp"
 #include "reference/scene_checks.hpp"

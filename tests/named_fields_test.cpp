@@ -1,7 +1,7 @@
 /// \file
 /// A port of their solver against their reference: the tolerance is what the reference states, term
 /// by term, and where it states none nothing passes.
-#include "oracle/named_fields.hpp"
+#include "oracle/files/named_fields.hpp"
 
 #include "tests/results_fixture.hpp"
 

@@ -1,6 +1,6 @@
 /// \file
 /// How many particles a scene can be asked for.
-#include "tools/particles_option.hpp"
+#include "tools/commands/particles_option.hpp"
 
 #include "reference/error.hpp"
 #include "reference/initial_state.hpp"

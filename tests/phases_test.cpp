@@ -1,6 +1,6 @@
 /// \file
 /// Phases follow from the tilt by the rule that phases.hpp states.
-#include "tools/phases.hpp"
+#include "tools/common/phases.hpp"
 #include "reference/error.hpp"
 
 #include <gtest/gtest.h>

@@ -1,7 +1,8 @@
 /// \file
 /// The suite is worth what it catches: every fault of a catalogue must fail the check that is there
 /// for it, and the solver without a fault must pass every check.
-#include "oracle/conform.hpp"
+#include "oracle/checks/conform.hpp"
+#include "oracle/files/fixture_file.hpp"
 #include "tests/edited_reference.hpp"
 
 #include "reference/kernel.hpp"

@@ -2,7 +2,7 @@
 /// `decant pour` in the process of a test.
 #pragma once
 
-#include "tools/commands.hpp"
+#include "tools/commands/commands.hpp"
 
 #include <string>
 #include <vector>

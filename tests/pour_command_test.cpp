@@ -1,15 +1,16 @@
 /// \file
 /// A pour that is stopped, killed or failed, and what it leaves behind.
-#include "tools/pour.hpp"
+#include "oracle/files/fixture_file.hpp"
+#include "tools/pour/pour.hpp"
 
-#include "oracle/fixture.hpp"
-#include "oracle/hdf5_io.hpp"
-#include "oracle/reference_backend.hpp"
+#include "oracle/files/hdf5_io.hpp"
+#include "oracle/solution/fixture.hpp"
+#include "oracle/solution/reference_backend.hpp"
 #include "reference/error.hpp"
 #include "tests/falling_points.hpp"
 #include "tests/pour_arguments.hpp"
-#include "tools/checkpoint.hpp"
-#include "tools/commands.hpp"
+#include "tools/commands/commands.hpp"
+#include "tools/pour/checkpoint.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>

@@ -1,11 +1,11 @@
 /// \file
 /// Where two pours part is told by frame and field, and what differs is never told as the same.
-#include "tools/pour_diff.hpp"
+#include "tools/pour/pour_diff.hpp"
 
-#include "oracle/hdf5_io.hpp"
+#include "oracle/files/hdf5_io.hpp"
 #include "reference/error.hpp"
 #include "tests/falling_points.hpp"
-#include "tools/pour.hpp"
+#include "tools/pour/pour.hpp"
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>

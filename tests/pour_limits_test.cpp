@@ -1,13 +1,13 @@
 /// \file
 /// A run that leaves what its time step and its speed of sound were chosen for says where.
-#include "tools/limits.hpp"
+#include "tools/pour/limits.hpp"
 
 #include "gpu/backends.hpp"
 #include "reference/scene_checks.hpp"
 #include "reference/shapes.hpp"
 #include "tests/falling_points.hpp"
-#include "tools/pour.hpp"
-#include "tools/pour_report.hpp"
+#include "tools/pour/pour.hpp"
+#include "tools/pour/pour_report.hpp"
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>

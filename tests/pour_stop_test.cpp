@@ -1,19 +1,19 @@
 /// \file
 /// Pours in processes of their own: two that want the same folder, and such that are told to stop.
-#include "tools/pour.hpp"
+#include "tools/pour/pour.hpp"
 
 #include "gpu/backends.hpp"
-#include "oracle/file_aside.hpp"
-#include "oracle/hdf5_io.hpp"
+#include "oracle/files/file_aside.hpp"
+#include "oracle/files/hdf5_io.hpp"
 #include "reference/error.hpp"
 #include "reference/scene_file.hpp"
 #include "tests/falling_points.hpp"
 #include "tests/pour_arguments.hpp"
-#include "tools/checkpoint.hpp"
-#include "tools/commands.hpp"
-#include "tools/folder_lock.hpp"
-#include "tools/stop_signal.hpp"
-#include "tools/stretches.hpp"
+#include "tools/commands/commands.hpp"
+#include "tools/common/stop_signal.hpp"
+#include "tools/pour/checkpoint.hpp"
+#include "tools/pour/folder_lock.hpp"
+#include "tools/pour/stretches.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>

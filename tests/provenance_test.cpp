@@ -1,6 +1,6 @@
 /// \file
 /// Every committed recording and result says which revision made it, one that everybody can get.
-#include "oracle/hdf5_io.hpp"
+#include "oracle/files/hdf5_io.hpp"
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>

@@ -3,7 +3,7 @@
 /// and periodic axes, far from the origin too.
 #pragma once
 
-#include "oracle/fixture.hpp"
+#include "oracle/solution/fixture.hpp"
 #include "reference/sampling.hpp"
 #include "reference/shapes.hpp"
 

@@ -1,8 +1,9 @@
 /// \file
 /// The documents say how every tolerance is made: a script that follows their formulas, apart from the code
 /// here, finds the same numbers.
-#include "oracle/conform.hpp"
-#include "oracle/port_inputs.hpp"
+#include "oracle/checks/conform.hpp"
+#include "oracle/files/port_inputs.hpp"
+#include "oracle/files/report_file.hpp"
 #include "tests/edited_reference.hpp"
 #include "tests/forms.hpp"
 #include "tests/python.hpp"

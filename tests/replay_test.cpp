@@ -1,10 +1,12 @@
 /// \file
 /// A failure is told with its particle's surroundings, and shows again in a fixture cut out of
 /// them.
-#include "tools/replay.hpp"
+#include "tools/commands/replay.hpp"
+#include "oracle/files/fixture_file.hpp"
+#include "oracle/report/console_table.hpp"
 
-#include "oracle/conform.hpp"
-#include "oracle/surroundings.hpp"
+#include "oracle/checks/conform.hpp"
+#include "oracle/checks/surroundings.hpp"
 #include "tests/edited_reference.hpp"
 #include "tests/falling_points.hpp"
 

@@ -1,10 +1,11 @@
 /// \file
 /// What changed is told, and what got worse is never told as no worse.
-#include "oracle/report_diff.hpp"
+#include "oracle/report/report_diff.hpp"
+#include "oracle/files/report_file.hpp"
 
 #include "reference/error.hpp"
 #include "tests/falling_points.hpp"
-#include "tools/commands.hpp"
+#include "tools/commands/commands.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,7 @@
 /// \file
-/// The page of tools/report_html.py holds what the report does, and needs nothing from elsewhere.
-#include "oracle/report.hpp"
+/// The page of tools/python/report_html.py holds what the report does, and needs nothing from elsewhere.
+#include "oracle/files/report_file.hpp"
+#include "oracle/report/report.hpp"
 #include "tests/falling_points.hpp"
 #include "tests/python.hpp"
 
@@ -72,7 +73,9 @@ class ReportPage : public testing::Test {
     if (!test::python_has("h5py, matplotlib"))
       GTEST_SKIP() << "no matplotlib in " << test::python() << "; ci/setup makes it";
   }
-  int run() { return test::run_python({DECANT_SOURCE_DIR "/tools/report_html.py", (folder_ / "report.h5").string()}); }
+  int run() {
+    return test::run_python({DECANT_SOURCE_DIR "/tools/python/report_html.py", (folder_ / "report.h5").string()});
+  }
   std::string page() {
     std::ifstream in(folder_ / "report.html");
     return {std::istreambuf_iterator<char>(in), {}};

@@ -1,7 +1,9 @@
 /// \file
 /// Reports say what was found, and never more: a pass without a score is none.
-#include "oracle/report.hpp"
-#include "oracle/hdf5_io.hpp"
+#include "oracle/report/report.hpp"
+#include "oracle/files/hdf5_io.hpp"
+#include "oracle/files/report_file.hpp"
+#include "oracle/report/console_table.hpp"
 #include "reference/error.hpp"
 
 #include <gtest/gtest.h>

@@ -3,11 +3,12 @@
 /// beside it.
 #pragma once
 
-#include "oracle/conform.hpp"
-#include "oracle/hdf5_io.hpp"
+#include "oracle/checks/conform.hpp"
+#include "oracle/files/fixture_file.hpp"
+#include "oracle/files/hdf5_io.hpp"
 #include "tests/falling_points.hpp"
 #include "tests/small_fixture.hpp"
-#include "tools/results_judgement.hpp"
+#include "tools/commands/results_judgement.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,8 @@
 /// \file
 /// Fields computed elsewhere are judged as a backend's are, and what is not there never passes.
-#include "oracle/results.hpp"
+#include "oracle/files/results.hpp"
 
-#include "oracle/reference_backend.hpp"
+#include "oracle/solution/reference_backend.hpp"
 #include "tests/results_fixture.hpp"
 
 #include <cmath>

@@ -1,6 +1,7 @@
 /// \file
 /// What a backend carries from one advance to the next is a function of the state that a checkpoint holds:
 /// whoever loads that state goes on to the same bits as whoever never stopped.
+#include "oracle/files/fixture_file.hpp"
 #include "tests/backend_variants.hpp"
 #include "tests/falling_points.hpp"
 #include "tests/random_scene.hpp"

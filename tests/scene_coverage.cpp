@@ -2,6 +2,7 @@
 /// The schema walked for its leaves, canonical scenes walked for what they have there.
 #include "tests/scene_coverage.hpp"
 
+#include "oracle/files/fixture_file.hpp"
 #include "reference/distance.hpp"
 #include "reference/pose.hpp"
 #include "reference/scene_file.hpp"

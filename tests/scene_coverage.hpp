@@ -3,7 +3,7 @@
 /// that no single key shows (a wall viscosity that does not follow from the viscosity, a tilted box).
 #pragma once
 
-#include "oracle/fixture.hpp"
+#include "oracle/solution/fixture.hpp"
 
 #include <nlohmann/json_fwd.hpp>
 

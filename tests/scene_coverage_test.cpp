@@ -30,7 +30,7 @@ TEST(SceneCoverage, KeysSaidToHaveNoInfluenceAreKeys) {
 /// A new key of the scene fails here until a recording and the fuzzed problems have it in two values.
 TEST(SceneCoverage, RecordingsVaryEveryKeyThatChangesTheAnswer) {
   const auto gaps = coverage_of_fixtures().gaps(leaf_keys_of_scenes());
-  EXPECT_TRUE(gaps.empty()) << "vary these in a recording of fixtures/ (tools/record_hostile.py), or say in "
+  EXPECT_TRUE(gaps.empty()) << "vary these in a recording of fixtures/ (tools/python/record_hostile.py), or say in "
                                "keys_without_influence() why they change nothing:\n  "
                             << fmt::format("{}", fmt::join(gaps, "\n  "));
 }

@@ -1,6 +1,8 @@
 /// \file
 /// Fixtures and reports are what their documents say, as h5py sees them.
-#include "oracle/report.hpp"
+#include "oracle/files/fixture_file.hpp"
+#include "oracle/files/report_file.hpp"
+#include "oracle/report/report.hpp"
 #include "tests/python.hpp"
 #include "tests/small_fixture.hpp"
 #include "tools/validation/validation.hpp"
@@ -12,9 +14,9 @@
 namespace decant {
 namespace {
 
-/// Exit status of tools/check_schema.py on a file; its output goes to the test's.
+/// Exit status of tools/python/check_schema.py on a file; its output goes to the test's.
 int checked(const std::filesystem::path& file) {
-  return test::run_python({DECANT_SOURCE_DIR "/tools/check_schema.py", file.string()});
+  return test::run_python({DECANT_SOURCE_DIR "/tools/python/check_schema.py", file.string()});
 }
 
 class Schema : public FixtureFile {

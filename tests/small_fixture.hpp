@@ -2,7 +2,9 @@
 /// A small fixture in a folder of its own, and the ways to damage it.
 #pragma once
 
-#include "oracle/fixture.hpp"
+#include "oracle/files/fixture_file.hpp"
+#include "oracle/solution/digest.hpp"
+#include "oracle/solution/fixture.hpp"
 #include "reference/error.hpp"
 #include "reference/initial_state.hpp"
 #include "reference/sampling.hpp"

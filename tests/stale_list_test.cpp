@@ -1,8 +1,8 @@
 /// \file
 /// Stale lists: what is missed is counted right, nothing is missed where the bound says so, and errors
 /// grow with the powers that the kernels' edges give them.
-#include "oracle/stale_list.hpp"
-#include "oracle/list_theory.hpp"
+#include "oracle/lists/stale_list.hpp"
+#include "oracle/lists/list_theory.hpp"
 #include "tests/random_scene.hpp"
 #include "tools/drift/power_fit.hpp"
 

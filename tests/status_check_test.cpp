@@ -1,8 +1,8 @@
 /// \file
 /// The check `status` sees every report that is not made, or made wrongly.
-#include "oracle/status_check.hpp"
-#include "oracle/conform.hpp"
-#include "oracle/reference_backend.hpp"
+#include "oracle/checks/status_check.hpp"
+#include "oracle/checks/conform.hpp"
+#include "oracle/solution/reference_backend.hpp"
 #include "tests/random_scene.hpp"
 
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
 /// \file
 /// The bound of a sum: no order of additions exceeds it, and where terms round alike it says so.
-#include "oracle/sum_bound.hpp"
+#include "oracle/solution/sum_bound.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,8 @@
 /// \file
 /// The same problem told otherwise has the same answer: the oracle itself must not care.
 #include "gpu/backends.hpp"
-#include "oracle/conform.hpp"
+#include "oracle/checks/conform.hpp"
+#include "oracle/files/fixture_file.hpp"
 #include "reference/error.hpp"
 #include "reference/pose.hpp"
 #include "reference/sampling.hpp"

@@ -4,8 +4,8 @@
 #include "tools/validation/observers.hpp"
 #include "tools/validation/wall_patch.hpp"
 
-#include "oracle/hdf5_io.hpp"
-#include "oracle/reference_backend.hpp"
+#include "oracle/files/hdf5_io.hpp"
+#include "oracle/solution/reference_backend.hpp"
 #include "reference/error.hpp"
 #include "reference/initial_state.hpp"
 #include "reference/sampling.hpp"

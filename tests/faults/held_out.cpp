@@ -2,6 +2,7 @@
 /// Recordings in the order of their size, so that most faults cost little.
 #include "tests/faults/held_out.hpp"
 
+#include "oracle/files/fixture_file.hpp"
 #include "tests/faults/trials.hpp"
 
 #include <fmt/format.h>

@@ -3,6 +3,7 @@
 #include "tests/faults/trials.hpp"
 
 #include "gpu/fault.hpp"
+#include "oracle/files/fixture_file.hpp"
 
 #include <fmt/format.h>
 

@@ -2,7 +2,7 @@
 /// One wrong backend judged on one recording, in a process of its own.
 #pragma once
 
-#include "oracle/conform.hpp"
+#include "oracle/checks/conform.hpp"
 #include "tests/faults/processes.hpp"
 
 #include <nlohmann/json.hpp>

@@ -2,7 +2,7 @@
 /// Edits by HDF5's own means, so that what the reader meets is a sound file with unsound contents.
 #include "tests/readers/fixture_edits.hpp"
 
-#include "oracle/hdf5_handle.hpp"
+#include "oracle/files/hdf5_handle.hpp"
 
 #include <unistd.h>
 

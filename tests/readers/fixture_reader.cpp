@@ -1,7 +1,8 @@
 /// \file
 /// Bytes as a fixture: refused with file, key and bound, or taken. Half of the inputs come from edits of
 /// whole objects, for bytes that change at random rarely get past HDF5.
-#include "oracle/fixture.hpp"
+#include "oracle/files/fixture_file.hpp"
+#include "oracle/solution/fixture.hpp"
 #include "tests/readers/expect.hpp"
 #include "tests/readers/fixture_edits.hpp"
 

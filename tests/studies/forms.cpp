@@ -2,7 +2,8 @@
 /// One line per problem, set of forms and field; their table by field and by choice.
 #include "tests/studies/forms.hpp"
 
-#include "oracle/conform.hpp"
+#include "oracle/checks/conform.hpp"
+#include "oracle/files/fixture_file.hpp"
 #include "reference/sampling.hpp"
 #include "tests/forms.hpp"
 

@@ -9,7 +9,8 @@
 ///           often a correct run would be called wrong; and a viscosity wrong by 1 % against the same.
 /// coverage  which values of which keys of a scene the recordings and fuzzed problems have.
 #include "gpu/backends.hpp"
-#include "oracle/conform.hpp"
+#include "oracle/checks/conform.hpp"
+#include "oracle/files/fixture_file.hpp"
 #include "reference/sampling.hpp"
 #include "tests/random_scene.hpp"
 #include "tests/scene_coverage.hpp"

@@ -5,10 +5,10 @@
 #pragma once
 
 #include "oracle/backend.hpp"
-#include "oracle/ensemble.hpp"
-#include "oracle/fixture.hpp"
-#include "oracle/list_theory.hpp"
-#include "oracle/stale_list.hpp"
+#include "oracle/lists/list_theory.hpp"
+#include "oracle/lists/stale_list.hpp"
+#include "oracle/solution/ensemble.hpp"
+#include "oracle/solution/fixture.hpp"
 #include "tools/drift/power_fit.hpp"
 
 #include <array>

@@ -1,12 +1,12 @@
 /// \file
 /// Lists at work: what a substep costs with them, where the fluid is after a window, and what becomes of a
 /// whole pour. Complete lists of the same backend on the same device are what they are held to.
-#include "oracle/audit.hpp"
+#include "oracle/checks/audit.hpp"
 #include "reference/error.hpp"
 #include "reference/initial_state.hpp"
 #include "reference/sampling.hpp"
 #include "tools/drift/drift.hpp"
-#include "tools/pour.hpp"
+#include "tools/pour/pour.hpp"
 
 #include <algorithm>
 #include <chrono>

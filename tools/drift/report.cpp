@@ -1,8 +1,8 @@
 /// \file
 /// Drift as a table and as HDF5.
-#include "oracle/audit.hpp"
-#include "oracle/hdf5_io.hpp"
-#include "tools/build_provenance.hpp"
+#include "oracle/checks/audit.hpp"
+#include "oracle/files/hdf5_io.hpp"
+#include "tools/common/build_provenance.hpp"
 #include "tools/drift/drift.hpp"
 
 #include <fmt/format.h>

@@ -1,6 +1,6 @@
 /// \file
 /// Lists of another program, checked as any input, then looked at like our own.
-#include "oracle/hdf5_io.hpp"
+#include "oracle/files/hdf5_io.hpp"
 #include "reference/error.hpp"
 #include "reference/sampling.hpp"
 #include "tools/drift/drift.hpp"

@@ -2,10 +2,11 @@
 /// Threads take seeds by turns, each with backends of its own; what they find is put in order after.
 #include "tools/fuzz/campaign.hpp"
 
-#include "oracle/file_aside.hpp"
+#include "oracle/files/file_aside.hpp"
+#include "oracle/files/fixture_file.hpp"
 #include "reference/scene_file.hpp"
-#include "tools/build_provenance.hpp"
-#include "tools/recording.hpp"
+#include "tools/common/build_provenance.hpp"
+#include "tools/common/recording.hpp"
 
 #include <fmt/format.h>
 #include <omp.h>

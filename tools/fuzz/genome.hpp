@@ -6,7 +6,7 @@
 /// Legend: dx particle spacing, H support radius, c0 sound speed.
 #pragma once
 
-#include "oracle/fixture.hpp"
+#include "oracle/solution/fixture.hpp"
 
 #include <array>
 #include <cstdint>

@@ -1,8 +1,8 @@
 /// \file
 /// The properties, and how each is asked of a backend.
-#include "oracle/conform.hpp"
-#include "oracle/ensemble.hpp"
-#include "oracle/field_checks.hpp"
+#include "oracle/checks/conform.hpp"
+#include "oracle/checks/field_checks.hpp"
+#include "oracle/solution/ensemble.hpp"
 #include "reference/error.hpp"
 #include "reference/sampling.hpp"
 #include "reference/scene_checks.hpp"

@@ -1,7 +1,7 @@
 /// \file
 /// Campaigns as a table and as HDF5.
-#include "oracle/hdf5_io.hpp"
-#include "tools/build_provenance.hpp"
+#include "oracle/files/hdf5_io.hpp"
+#include "tools/common/build_provenance.hpp"
 #include "tools/fuzz/campaign.hpp"
 
 #include <fmt/format.h>

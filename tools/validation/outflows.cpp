@@ -1,6 +1,6 @@
 /// \file
 /// Water that leaves: through a slit in the bottom of a tank, and over the lip of a cup that leans.
-#include "oracle/audit.hpp"
+#include "oracle/checks/audit.hpp"
 #include "tools/validation/observers.hpp"
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 /// \file
 /// What the cases gave, as a table and as HDF5.
-#include "oracle/hdf5_io.hpp"
-#include "tools/build_provenance.hpp"
+#include "oracle/files/hdf5_io.hpp"
+#include "tools/common/build_provenance.hpp"
 #include "tools/validation/validation.hpp"
 
 #include <fmt/format.h>

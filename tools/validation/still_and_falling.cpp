@@ -1,6 +1,6 @@
 /// \file
 /// Fluid without flow: a blob that falls freely, water that stands in a tank or a cup.
-#include "oracle/tolerance.hpp"
+#include "oracle/solution/tolerance.hpp"
 #include "reference/distance.hpp"
 #include "tools/validation/observers.hpp"
 
@@ -13,7 +13,7 @@ namespace {
 
 /// Against the integrator's own exact solution: v = v0 + g n dt, x = x0 + v0 n dt + g dt² n(n+1)/2, because
 /// pair forces cancel in the sum. What rounding may add is followed along the run: in each substep
-/// the tolerance of an acceleration times dt (oracle/tolerance.hpp; averaged over particles, signs taken
+/// the tolerance of an acceleration times dt (oracle/solution/tolerance.hpp; averaged over particles, signs taken
 /// as all alike), two roundings of the velocity and two of the position.
 class FreeFall : public CaseObserver {
  public:

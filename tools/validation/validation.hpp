@@ -4,7 +4,7 @@
 #pragma once
 
 #include "oracle/backend.hpp"
-#include "oracle/report.hpp"
+#include "oracle/report/report.hpp"
 #include "reference/scene.hpp"
 #include "reference/state.hpp"
 

@@ -1,0 +1,230 @@
+/// \file
+/// What the oracle prepares, and what is asked of a backend.
+#include "oracle/checks/conform.hpp"
+
+#include "oracle/checks/advanced_check.hpp"
+#include "oracle/checks/comparison.hpp"
+#include "oracle/checks/field_checks.hpp"
+#include "oracle/checks/run_checks.hpp"
+#include "oracle/checks/status_check.hpp"
+#include "oracle/checks/surroundings.hpp"
+#include "oracle/solution/sum_bound.hpp"
+#include "reference/error.hpp"
+#include "reference/sampling.hpp"
+#include "reference/solver.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <optional>
+#include <set>
+
+namespace decant {
+namespace {
+
+void run_fields(Backend& backend, const Judgement& oracle, Sheet& sheet) {
+  const auto n = oracle.own.fields.density.size(), m = oracle.own.fields.boundary_volume.size();
+  Fields got = Fields::unwritten(n, m);
+  if (const Status status = backend.evaluate(got); !status.ok()) return sheet.failed("evaluation", describe(status));
+  judge_stages(got, all_answered(), oracle, sheet);
+  Fields staged = Fields::unwritten(n, m);
+  if (const Status status = backend.evaluate(staged, &oracle.inputs); !status.ok())
+    return sheet.failed("acceleration", describe(status));
+  judge_staged(staged, all_answered(), oracle, sheet);
+  judge_evaluation(got, all_answered(), oracle, sheet);
+}
+
+/// What lists that verify themselves count in the first substep: the pairs of the state that was loaded. A
+/// particle with a pair too near to H may have one more or less, and rarely two.
+void judge_verified(const PairTotals& counted, const OracleAnswer& own, Sheet& sheet) {
+  if (counted.pairs == 0 && counted.wall_pairs == 0) return;
+  const auto row = [&](const char* field, std::int64_t got, const auto& neighbors, const std::vector<bool>& ambiguous) {
+    const auto unsure = std::count(ambiguous.begin(), ambiguous.end(), true);
+    compare(std::abs(static_cast<double>(got - neighbors.sum())), 2.0 * static_cast<double>(unsure),
+            sheet.row("substep", field, "1"));
+  };
+  row("verified_pairs", counted.pairs, own.fields.fluid_neighbor_count, own.fluid_ambiguous);
+  row("verified_wall_pairs", counted.wall_pairs, own.fields.wall_neighbor_count, own.wall_ambiguous);
+}
+
+void run_substep(Backend& backend, const Fixture& fixture, const Judgement& oracle, Sheet& sheet) {
+  if (const Status status = backend.advance(1); !status.ok()) return sheet.failed("substep", describe(status));
+  ParticleState got;
+  backend.read(got);
+  const auto n = fixture.state.size();
+  if (got.position.cols() != n || got.velocity.cols() != n)
+    return sheet.failed(
+        "substep", fmt::format("{} positions and {} velocities, not {}", got.position.cols(), got.velocity.cols(), n));
+  if (got.substep != fixture.state.substep + 1)
+    return sheet.failed("substep", fmt::format("is at substep {}, not {}", got.substep, fixture.state.substep + 1));
+  judge_substep(got, all_answered(), fixture, oracle, sheet);
+  judge_verified(backend.neighbor_stats().verified, oracle.own, sheet);
+}
+
+/// Recorded against recomputed, both in double: only the last bits may differ between compilers. Tolerances
+/// are for a port of 2⁻²⁴ and an oracle of 2⁻⁵³; here both are of 2⁻⁵³.
+void require_reproduced(const Fixture& fixture, const std::string& name, const Eigen::VectorXd& recorded,
+                        const Eigen::VectorXd& today, const Eigen::VectorXd& tolerance) {
+  for (Eigen::Index k = 0; k < today.size(); ++k) {
+    const double bound = 2 * reference_roundoff / (unit_roundoff + reference_roundoff) * tolerance[k];
+    if (std::abs(recorded[k] - today[k]) <= bound) continue;
+    throw InputError(fixture.name, name + "[" + std::to_string(k) + "]", fmt::format("{:.17g}", recorded[k]),
+                     fmt::format("this build's reference gives {:.17g} ± {:.2g}; record the "
+                                 "fixture anew if that is intended",
+                                 today[k], bound));
+  }
+}
+
+void require_reproduced(const Fixture& fixture, const OracleAnswer& today) {
+  const bool recorded_at_all = fixture.fields || fixture.sample_id.size() > 0;
+  if (!recorded_at_all) return;
+  if (fixture.fields) {
+    const Fields& recorded = *fixture.fields;
+    const auto check = [&](const char* name, const auto& then, const auto& now, const auto& bound) {
+      require_reproduced(fixture, name, flat(then), flat(now), flat(bound));
+    };
+    check("boundary_volume", recorded.boundary_volume, today.fields.boundary_volume, today.tolerance.boundary_volume);
+    check("density", recorded.density, today.fields.density, today.tolerance.density);
+    check("pressure", recorded.pressure, today.fields.pressure, today.tolerance.pressure);
+    for (const auto& field : acceleration_fields)
+      check(field.name, recorded.*field.member, today.fields.*field.member, today.tolerance.*field.member);
+    for (const auto& fact : neighbor_facts)
+      check("neighbors", recorded.*fact.member, today.fields.*fact.member, today.tolerance.*fact.member);
+    return;
+  }
+  const auto sampled = [&](const Eigen::VectorXd& all) {
+    return Eigen::VectorXd(all(fixture.sample_id.cast<Eigen::Index>()));
+  };
+  const auto sampled3 = [&](const Eigen::Matrix3Xd& all) {
+    return Eigen::Matrix3Xd(all(Eigen::all, fixture.sample_id.cast<Eigen::Index>()));
+  };
+  require_reproduced(fixture, "sample density", fixture.sample_density, sampled(today.fields.density),
+                     sampled(today.tolerance.density));
+  require_reproduced(fixture, "sample pressure", fixture.sample_pressure, sampled(today.fields.pressure),
+                     sampled(today.tolerance.pressure));
+  require_reproduced(fixture, "sample acceleration", flat(fixture.sample_acceleration),
+                     flat(sampled3(today.fields.acceleration)), flat(sampled3(today.tolerance.acceleration)));
+}
+
+}  // namespace
+
+std::string evaluate_oracle(const Scene& scene, const ParticleState& state, Fields& fields, ConditionSums& condition) {
+  OracleAnswer a = answer(scene, sample_walls(scene), state);
+  std::string why = weakness(a);
+  fields = std::move(a.fields);
+  condition = std::move(a.condition);
+  return why;
+}
+
+std::string weakness(const OracleAnswer& a) {
+  const auto objection = [](const std::vector<bool>& ambiguous, std::int64_t most, const char* kind) {
+    const auto count = std::count(ambiguous.begin(), ambiguous.end(), true);
+    return count <= most ? std::string()
+                         : fmt::format(
+                               "{} particles have {} neighbors too near H for fp32 to place, "
+                               "at most {} expected; ",
+                               count, kind, most);
+  };
+  const std::string why = objection(a.fluid_ambiguous, a.most_fluid_ambiguous, "fluid") +
+                          objection(a.wall_ambiguous, a.most_wall_ambiguous, "wall");
+  return why.empty() ? why : why + "no backend can pass (a lattice? let it move first)";
+}
+
+namespace {
+
+/// Where a run of the fixture is interrupted, whatever is asked of it: the same run every time.
+std::vector<Stretch> stretches_of(const Fixture& fixture, int look_every) {
+  const auto substeps = static_cast<int>(fixture.ensemble.substeps);
+  const std::vector<int> viewed = viewed_after(fixture.state.size(), substeps);
+  std::set<int> ends(viewed.begin(), viewed.end());
+  for (int done = look_every > 0 || viewed.empty() ? 0 : viewed.back(); done < substeps; ends.insert(done)) {
+    const int left = substeps - done;
+    done += look_every > 0 ? std::min(look_every, left) : (left + 1) / 2;
+  }
+  std::vector<Stretch> all;
+  int last = 0;
+  for (const int end : ends) {
+    all.push_back({end - last, std::ranges::find(viewed, end) != viewed.end()});
+    last = end;
+  }
+  return all;
+}
+
+/// The oracle's own run with the looks that a backend's run gets.
+void run_ahead(const Fixture& fixture, Judgement& j) {
+  Solver solver(fixture.scene, j.walls, fixture.state);
+  Audit audit(fixture.scene);
+  audit.look(fixture.state);
+  std::int64_t done = 0;
+  for (const Stretch& stretch : j.stretches) {
+    for (int k = 0; k < stretch.substeps; ++k) solver.substep();
+    if (4 * done < fixture.ensemble.substeps) ++j.repeated;
+    done += stretch.substeps;
+    j.later_look = audit.look(solver.state());
+    j.deepest = std::max(j.deepest, j.later_look.deepest);
+    j.crossed = std::max(j.crossed, j.later_look.crossed);
+  }
+  j.later = solver.state();
+}
+
+}  // namespace
+
+Judgement prepare(const Fixture& fixture, const CheckSelection& checks, int look_every) {
+  const Scene& scene = fixture.scene;
+  Judgement j;
+  j.walls = sample_walls(scene);
+  j.volumes = wall_answer(scene, j.walls);
+  const WallAnswer& volumes = j.volumes;
+  j.own = answer(scene, j.walls, volumes, fixture.state);
+  require_reproduced(fixture, j.own);
+  j.inputs.density = j.own.fields.density.cast<float>().cast<double>();
+  j.inputs.pressure = j.own.fields.pressure.cast<float>().cast<double>();
+  const auto wanted = [&](std::initializer_list<const char*> names) {
+    return std::any_of(names.begin(), names.end(), [&](const char* name) { return checks.count(name) > 0; });
+  };
+  if (wanted({"fields", "conservation"})) {
+    j.given = answer(scene, j.walls, volumes, fixture.state, &j.inputs);
+    j.given_float = float_fields(scene, j.walls, volumes, fixture.state, &j.inputs);
+  }
+  if (wanted({"fields"})) j.own_float = float_fields(scene, j.walls, volumes, fixture.state);
+  if (wanted({"substep"})) j.substep = substep_answer(scene, fixture.state, j.own);
+  if (wanted({"contact"})) j.contact = contact_problems(scene, fixture.state, j.own.fields.acceleration);
+  const bool runs = wanted({"trajectory", "mass", "containment", "determinism"});
+  if (runs || wanted({"advanced"})) j.stretches = stretches_of(fixture, look_every);
+  if (runs) run_ahead(fixture, j);
+  // Nobody looks beyond the last view.
+  while (!runs && !j.stretches.empty() && !j.stretches.back().viewed) j.stretches.pop_back();
+  if (!wanted({"advanced"}))
+    for (Stretch& stretch : j.stretches) stretch.viewed = false;
+  if (wanted({"invariance"}))
+    for (TransformedProblem& problem : transformed_problems(scene, fixture.state)) {
+      Walls walls = sample_walls(problem.scene);
+      OracleAnswer its_answer = answer(problem.scene, walls, problem.state);
+      j.transformed.push_back({std::move(problem), std::move(walls), std::move(its_answer)});
+    }
+  return j;
+}
+
+std::vector<CheckRow> judge(Backend& backend, const Fixture& fixture, const Judgement& oracle,
+                            const CheckSelection& checks) {
+  std::optional<Sheet> sheet;
+  try {
+    sheet.emplace(backend.info(), fixture.name);
+    backend.load(fixture.scene, oracle.walls, fixture.state);
+    if (checks.count("fields")) run_fields(backend, oracle, *sheet);
+    if (checks.count("substep")) run_substep(backend, fixture, oracle, *sheet);
+    if (checks.count("contact")) judge_contact(backend, oracle.walls, oracle.contact, *sheet);
+    judge_runs(backend, fixture, oracle, checks, *sheet);
+    if (checks.count("status")) judge_status(backend, fixture.scene, fixture.state.substep, *sheet);
+  } catch (const std::exception& error) {
+    if (!sheet) sheet.emplace(BackendInfo{}, fixture.name);  // it cannot even say what it is
+    sheet->failed("run", error.what());
+  }
+  std::vector<CheckRow> rows = sheet->take();
+  locate(fixture, oracle.walls, rows);
+  return rows;
+}
+
+}  // namespace decant

@@ -1,0 +1,79 @@
+/// \file
+/// One backend judged on one fixture by the checks of checks.hpp.
+#pragma once
+
+#include "oracle/backend.hpp"
+#include "oracle/checks/audit.hpp"
+#include "oracle/checks/checks.hpp"
+#include "oracle/checks/contact_check.hpp"
+#include "oracle/checks/transformed.hpp"
+#include "oracle/report/report.hpp"
+#include "oracle/solution/ensemble.hpp"
+#include "oracle/solution/fixture.hpp"
+#include "oracle/solution/substep_answer.hpp"
+#include "oracle/solution/tolerance.hpp"
+
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace decant {
+
+/// The oracle's answer to the same problem told otherwise.
+struct TransformedAnswer {
+  TransformedProblem problem;
+  Walls walls;
+  OracleAnswer answer;
+};
+
+/// A part of a run, after which its state is read.
+struct Stretch {
+  int substeps = 0;
+  bool viewed = false;  // fields are evaluated too (oracle/checks/advanced_check.hpp)
+};
+
+/// Everything the oracle has to say about one fixture. Made once, used for every backend.
+struct Judgement {
+  Walls walls;
+  WallAnswer volumes;
+  OracleAnswer own;               // every stage from the stage before
+  StageInputs inputs;             // the oracle's density and pressure, rounded to fp32
+  OracleAnswer given;             // accelerations from those inputs
+  Fields own_float, given_float;  // the same source in sequential fp32
+  SubstepAnswer substep;
+  std::vector<ContactProblem> contact;
+  // The oracle's own run, as long as the fixture's ensemble is, and looked at as backends' runs are.
+  std::vector<Stretch> stretches;
+  std::size_t repeated = 0;  // so many of them, a quarter of the run or more, show that it is reproducible
+  ParticleState later;
+  AuditResult later_look;
+  double deepest = 0;  // m, inside a wall, at any look
+  std::int64_t crossed = 0;
+  std::vector<TransformedAnswer> transformed;
+};
+
+/// Fields and condition sums at one state, as a fixture records them. Returns why no backend can
+/// pass on that state, for people to read; empty for a sound one. A lattice has thousands of pairs
+/// at one distance, and where that is H nearly, fp32 cannot tell who is a neighbor.
+std::string evaluate_oracle(const Scene& scene, const ParticleState& state, Fields& fields, ConditionSums& condition);
+
+/// Why no backend can pass where this is the answer; empty for a sound one.
+std::string weakness(const OracleAnswer& answer);
+
+/// Evaluates the oracle on the fixture's state, as far as these checks need it. Throws InputError where
+/// the recorded fields, if there are any, are not what this build's reference gives within the tolerances scaled from 2⁻²⁴
+/// to 2⁻⁵³.
+/// \param look_every  substeps between two looks at a run, for containment and mass; 0: where it is viewed,
+///                    after half of the rest, and so on
+Judgement prepare(const Fixture& fixture, const CheckSelection& checks = all_checks(), int look_every = 0);
+
+/// Loads the fixture into the backend and compares; a backend that throws or reports trouble gives
+/// rows with verdict fail and the reason. Rows of the check `fields` carry the stage's name:
+///   neighbors, boundary_volume, density, pressure   as the backend computes them
+///   equation_of_state, acceleration   from the oracle's density, and pressure
+///   evaluation                        from the backend's own
+/// \param oracle  prepared for these checks at least
+std::vector<CheckRow> judge(Backend& backend, const Fixture& fixture, const Judgement& oracle,
+                            const CheckSelection& checks = all_checks());
+
+}  // namespace decant

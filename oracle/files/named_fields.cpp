@@ -1,0 +1,246 @@
+/// \file
+/// States by name, fields by name, particles by id.
+#include "oracle/files/named_fields.hpp"
+
+#include "oracle/files/hdf5_io.hpp"
+#include "oracle/solution/sum_bound.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <tuple>
+
+namespace decant {
+namespace {
+
+/// Values by particle, and by component within one.
+struct NamedField {
+  Eigen::VectorXd values;
+  int components = 1;
+  bool integers = false;
+  std::string unit;
+};
+
+constexpr double exact_integers = 0x1p53;  // beyond, a double skips some
+
+NamedField read_field(const Hdf5Reader& in, const std::string& path, std::int64_t n) {
+  NamedField field;
+  const auto shape = in.shape(path);
+  field.components = shape.size() == 2 ? 3 : 1;
+  field.integers = in.holds_integers(path);
+  if (field.components == 3) {
+    field.values = flat(in.matrix3(path, n));
+  } else if (field.integers) {
+    field.values = flat(in.integers(path, n));
+    for (Eigen::Index k = 0; k < field.values.size(); ++k)
+      if (!(std::abs(field.values[k]) <= exact_integers))
+        in.fail(path, fmt::format("{:.0f} at {}", field.values[k], k), "within 2^53");
+  } else {
+    field.values = in.vector(path, n);
+  }
+  if (in.has_attribute(path, "unit")) field.unit = in.text_attribute(path, "unit");
+  return field;
+}
+
+void require(const Hdf5Reader& in, const std::string& path, const Eigen::VectorXd& values, bool negative_too) {
+  for (Eigen::Index k = 0; k < values.size(); ++k)
+    if (!std::isfinite(values[k]) || !(negative_too || values[k] >= 0))
+      in.fail(path, fmt::format("{:.9g} at {}", values[k], k), negative_too ? "finite" : "finite, >= 0");
+}
+
+/// A real attribute that may be missing. Throws where it is not finite or below 0.
+std::optional<double> stated(const Hdf5Reader& in, const std::string& object, const std::string& name) {
+  if (!in.has_attribute(object, name)) return {};
+  const double value = in.real_attribute(object, name);
+  if (!(value >= 0 && std::isfinite(value))) in.fail(object + "@" + name, fmt::format("{:.9g}", value), "finite, >= 0");
+  return value;
+}
+
+/// "" where the file itself is one state, "/name" of every group that is one.
+std::vector<std::string> states_of(const Hdf5Reader& in) {
+  std::vector<std::string> states;
+  if (in.has("/fields")) states.push_back("");
+  for (const auto& name : in.children("/"))
+    if (in.has("/" + name + "/fields")) states.push_back("/" + name);
+  if (states.empty()) in.fail("/fields", "missing", "at the root, or in a group for each state");
+  if (states.size() > 1 && states.front().empty())
+    in.fail(states[1] + "/fields", "beside /fields", "one state at the root, or several in groups");
+  return states;
+}
+
+/// One state of a file: its ids and its fields.
+struct State {
+  const Hdf5Reader& in;
+  std::string path;
+  std::vector<std::string> names;
+  std::int64_t n = 0;
+  bool has_ids = false;
+  IdVector ids;
+
+  State(const Hdf5Reader& file, std::string group) : in(file), path(std::move(group)) {
+    names = in.children(path + "/fields");
+    has_ids = in.has(path + "/id");
+    if (has_ids) {
+      ids = in.integers(path + "/id");
+      n = ids.size();
+    } else if (!names.empty()) {
+      const auto shape = in.shape(field(names.front()));
+      if (!shape.empty()) n = shape[0];
+      ids = IdVector::LinSpaced(n, 0, n - 1);
+    }
+  }
+  std::string field(const std::string& name) const { return path + "/fields/" + name; }
+  bool has(const std::string& name) const { return std::find(names.begin(), names.end(), name) != names.end(); }
+};
+
+/// (√n + c) (u + 2⁻⁵³) C of every value; empty where the field has no condition sum.
+Eigen::VectorXd derived_tolerance(const State& oracle, const std::string& name, int components) {
+  const Hdf5Reader& in = oracle.in;
+  const std::string path = oracle.path + "/condition/" + name;
+  const std::string terms_path = oracle.path + "/terms/" + name;
+  if (!in.has(path)) {
+    if (in.has(terms_path)) in.fail(path, "missing", "required beside " + terms_path);
+    return {};
+  }
+  const NamedField sums = read_field(in, path, oracle.n);
+  if (sums.components != components) in.fail(path, sums.components == 3 ? "[N,3]" : "[N]", "the field's shape");
+  require(in, path, sums.values, false);
+  const double u = stated(in, path, "precision").value_or(unit_roundoff);
+  const double c = stated(in, path, "c").value_or(default_roundings);
+  if (!(u > 0 && u < 1)) in.fail(path + "@precision", fmt::format("{:.9g}", u), "in 0 … 1");
+
+  Eigen::VectorXd terms;
+  if (in.has(terms_path)) {
+    terms = flat(in.integers(terms_path, oracle.n));
+    require(in, terms_path, terms, false);
+  } else if (const auto same_for_all = stated(in, path, "terms")) {
+    terms.setConstant(oracle.n, *same_for_all);
+  } else {
+    in.fail(terms_path, "missing", "the number of terms of each sum, here or in " + path + "@terms");
+  }
+  Eigen::VectorXd tolerance(sums.values.size());
+  for (Eigen::Index k = 0; k < tolerance.size(); ++k)
+    tolerance[k] = (std::sqrt(terms[k / components]) + c) * (u + reference_roundoff) * sums.values[k];
+  return tolerance;
+}
+
+/// √(Σx²/count), also where squares overflow.
+double root_mean_square(const Eigen::VectorXd& values) {
+  const double largest = values.size() ? values.cwiseAbs().maxCoeff() : 0;
+  if (!(largest > 0)) return largest;
+  return largest * std::sqrt((values / largest).squaredNorm() / static_cast<double>(values.size()));
+}
+
+/// tau of every value, or empty where the reference states nothing to judge by.
+Eigen::VectorXd tolerance_of(const State& oracle, const std::string& name, const NamedField& field) {
+  const std::string path = oracle.field(name);
+  Eigen::VectorXd tolerance = derived_tolerance(oracle, name, field.components);
+  const auto absolute = stated(oracle.in, path, "tolerance");
+  const auto relative = stated(oracle.in, path, "relative");
+  if (tolerance.size() == 0) {
+    if (!absolute && !relative && !field.integers) return {};
+    tolerance.setZero(field.values.size());
+  }
+  tolerance.array() += absolute.value_or(0) + relative.value_or(0) * root_mean_square(field.values);
+  for (Eigen::Index k = 0; k < tolerance.size(); ++k)
+    if (!std::isfinite(tolerance[k]))
+      oracle.in.fail(path, fmt::format("a tolerance beyond {:.3g} at {}", std::numeric_limits<double>::max(), k),
+                     "values and condition sums whose tolerance is a finite double");
+  return tolerance;
+}
+
+void judge_field(const State& oracle, const State& port, const Matching& ids, const std::string& name, Sheet& sheet) {
+  const std::string path = port.field(name);
+  const NamedField expected = read_field(oracle.in, oracle.field(name), oracle.n);
+  require(oracle.in, oracle.field(name), expected.values, true);
+  const Eigen::VectorXd tolerance = tolerance_of(oracle, name, expected);
+  CheckRow& row = sheet.row("fields", name, expected.unit.c_str());
+  if (!port.has(name)) {
+    row.reason = not_given;
+    return;
+  }
+  const NamedField got = read_field(port.in, path, port.n);
+  if (got.components != expected.components)
+    port.in.fail(path, got.components == 3 ? "[N,3]" : "[N]", "the reference's shape");
+  if (!got.unit.empty() && !expected.unit.empty() && got.unit != expected.unit)
+    port.in.fail(path + "@unit", got.unit, expected.unit);
+  if (!ids.ok()) {
+    row.reason = "the ids do not tell which particle is which";
+    return;
+  }
+  if (tolerance.size() == 0) {
+    row.reason = fmt::format(
+        "{} has no tolerance for it: neither /condition nor @tolerance nor "
+        "@relative",
+        oracle.in.file().filename().string());
+    return;
+  }
+  const Eigen::Map<const Eigen::MatrixXd> found(got.values.data(), got.components, port.n);
+  const Eigen::MatrixXd ordered = found(Eigen::all, ids.place);
+  compare({flat(ordered), expected.values, tolerance, {}, expected.components, nullptr, 0}, row);
+  if (row.worst_id >= 0) row.worst_id = oracle.ids[row.worst_id];
+}
+
+void judge_state(const State& oracle, const State& port, Sheet& sheet) {
+  if (oracle.n == 0) oracle.in.fail(oracle.path + "/fields", "no particle", "at least one field, one particle");
+  // Without ids a wrong number of particles is a wrong shape; with them, ids that are missing.
+  if (!oracle.has_ids && !port.has_ids && port.n != oracle.n && !port.names.empty())
+    port.in.fail(port.field(port.names.front()), fmt::format("{} particles", port.n),
+                 fmt::format("{}, as the reference has", oracle.n));
+  if (const Matching own = match_ids(oracle.ids, oracle.ids); !own.ok())
+    oracle.in.fail(oracle.path + "/id", own.trouble, "each id once");
+  for (const char* group : {"/condition", "/terms"})
+    if (oracle.in.has(oracle.path + group))
+      for (const auto& name : oracle.in.children(oracle.path + group))
+        if (!oracle.has(name))
+          oracle.in.fail(oracle.path + group + "/" + name, "of no field", "one of " + oracle.path + "/fields");
+  const Matching ids = match_ids(oracle.ids, port.ids);
+  if (oracle.has_ids || port.has_ids) judge_ids(ids, oracle.n, sheet);
+  for (const auto& name : oracle.names) judge_field(oracle, port, ids, name, sheet);
+  for (const auto& name : port.names)
+    if (!oracle.has(name))
+      sheet.row("fields", name, "").reason = oracle.in.file().filename().string() + " has no such field";
+}
+
+}  // namespace
+
+JudgedResults judge_named_fields(const std::filesystem::path& reference, const std::filesystem::path& results,
+                                 const std::string& name) {
+  const Hdf5Reader oracle(reference), port(results);
+  for (const auto& [in, kind, schema] :
+       {std::tuple{&oracle, "decant_reference", reference_schema}, std::tuple{&port, "decant_results", results_schema}})
+    if (const std::int64_t found = in->integer_attribute("/", kind); found != schema)
+      in->fail(fmt::format("/@{}", kind), std::to_string(found), std::to_string(schema));
+
+  BackendInfo info{name, "", "file", "", ""};
+  if (port.has_attribute("/", "device")) info.device = port.text_attribute("/", "device");
+  const auto expected = states_of(oracle), found = states_of(port);
+  const auto has = [](const std::vector<std::string>& states, const std::string& state) {
+    return std::find(states.begin(), states.end(), state) != states.end();
+  };
+  JudgedResults judged;
+  judged.states = static_cast<std::int64_t>(expected.size());
+  for (const auto& state : expected) {
+    Sheet sheet(info, reference.stem().string() + state);
+    const State theirs(oracle, state);
+    if (has(found, state)) {
+      judge_state(theirs, State(port, state), sheet);
+    } else {
+      judged.missing_states.push_back(state.empty() ? "/" : state);
+      for (const auto& field : theirs.names) sheet.row("fields", field, "").reason = not_given;
+    }
+    judged.add(sheet.take());
+  }
+  for (const auto& state : found) {
+    if (has(expected, state)) continue;
+    Sheet sheet(info, reference.stem().string() + state);
+    sheet.row("fields", "all", "").reason = oracle.file().filename().string() + " has no such state";
+    judged.add(sheet.take());
+  }
+  return judged;
+}
+
+}  // namespace decant

@@ -1,0 +1,77 @@
+/// \file
+/// The report's verdicts.
+#include "oracle/report/report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace decant {
+
+bool has_arrays(const CheckRow& row) { return row.error.size() > 0 && row.error.size() == row.tolerances.size(); }
+
+Eigen::VectorXd scores_of(const CheckRow& row) {
+  Eigen::VectorXd scores(row.error.size());
+  for (Eigen::Index k = 0; k < scores.size(); ++k) {
+    const double error = std::abs(row.error[k]);
+    const double score = error == 0 && row.tolerances[k] == 0 ? 0 : error / row.tolerances[k];
+    scores[k] = std::isnan(score) ? std::numeric_limits<double>::infinity() : score;
+  }
+  return scores;
+}
+
+std::vector<double> quantiles_of(const CheckRow& row) {
+  if (!has_arrays(row))
+    return row.score_quantiles.size() == quantile_percent.size()
+               ? row.score_quantiles
+               : std::vector<double>(quantile_percent.size(), no_number);
+  Eigen::VectorXd scores = scores_of(row);
+  std::sort(scores.begin(), scores.end());
+  std::vector<double> q;
+  for (const int percent : quantile_percent)
+    q.push_back(scores[std::lround(percent / 100.0 * static_cast<double>(scores.size() - 1))]);
+  return q;
+}
+
+const char* to_string(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::pass:
+      return "pass";
+    case Verdict::fail:
+      return "fail";
+    case Verdict::not_run:
+      return "not_run";
+  }
+  return "fail";
+}
+
+Verdict judged_verdict(const CheckRow& row) {
+  const bool stands = row.score >= 0 && row.score <= 1 && !std::isnan(row.value) && !std::isnan(row.tolerance);
+  return row.verdict == Verdict::pass && !stands ? Verdict::fail : row.verdict;
+}
+
+std::string judged_reason(const CheckRow& row) {
+  if (judged_verdict(row) == row.verdict) return row.reason;
+  return fmt::format("said to pass with score {}, value {}, tolerance {}", row.score, row.value, row.tolerance);
+}
+
+void condense(CheckRow& row) {
+  row.score_quantiles = quantiles_of(row);
+  if (judged_verdict(row) != Verdict::pass) return;
+  row.error.resize(0);
+  row.tolerances.resize(0);
+}
+
+int exit_status(const Report& report) {
+  bool fails = false, missing = report.rows.empty();
+  for (const auto& row : report.rows) {
+    const Verdict verdict = judged_verdict(row);
+    fails |= verdict == Verdict::fail;
+    missing |= verdict == Verdict::not_run;
+  }
+  return fails ? 1 : missing ? 3 : 0;
+}
+
+}  // namespace decant

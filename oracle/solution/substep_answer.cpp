@@ -1,0 +1,50 @@
+/// \file
+/// The oracle's substep once more, carrying an error bound along with every particle.
+#include "oracle/solution/substep_answer.hpp"
+
+#include "oracle/solution/contact_bounds.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace decant {
+
+void gather_images(const Domain& domain, std::vector<SubstepOutcome>& outcomes) {
+  for (int a = 0; a < 3; ++a) {
+    if (!domain.periodic[static_cast<std::size_t>(a)]) continue;
+    const double period = domain.max[a] - domain.min[a], first = outcomes.front().position[a];
+    for (SubstepOutcome& outcome : outcomes)
+      outcome.position[a] -= period * std::round((outcome.position[a] - first) / period);
+  }
+}
+
+SubstepAnswer substep_answer(const Scene& scene, const ParticleState& state, const OracleAnswer& fields) {
+  const ContactBounds bounds(scene);
+  const std::vector<Pose> poses = bounds.poses_at(scene.time_at(state.substep + 1));
+  const auto n = static_cast<std::size_t>(state.size());
+  SubstepAnswer answer;
+  answer.outcomes.resize(n);
+  answer.ambiguous.assign(n, false);
+  answer.most_ambiguous = state.size() / 50 + 10;
+  for (std::size_t k = 0; k < n; ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    const auto run = [&](unsigned flips) {
+      BoundedParticle p{state.position.col(i), state.velocity.col(i), Vec3::Zero(), Vec3::Zero()};
+      p.flips = flips;
+      bounds.accelerate(fields.fields.acceleration.col(i), fields.tolerance.acceleration.col(i), p);
+      bounds.fly(p);
+      bounds.collide(poses, p);
+      return p;
+    };
+    each_decision(run, [&](const BoundedParticle& p) {
+      answer.outcomes[k].push_back({p.x, p.v, p.tau_x, p.tau_v});
+      if (!p.ambiguous && p.undecided <= most_undecided) return;
+      answer.ambiguous[k] = true;
+      answer.longest_push = std::max(answer.longest_push, p.pushed);
+    });
+    gather_images(scene.domain, answer.outcomes[k]);
+  }
+  return answer;
+}
+
+}  // namespace decant

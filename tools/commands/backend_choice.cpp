@@ -1,0 +1,87 @@
+/// \file
+/// Looks names up and asks executors whether they are there.
+#include "tools/commands/backend_choice.hpp"
+
+#include "gpu/backends.hpp"
+#include "gpu/options.hpp"
+#include "oracle/solution/reference_backend.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+namespace decant {
+namespace {
+
+[[noreturn]] void refuse(const char* option, const std::string& value, const std::string& bound) {
+  throw InputError("command line", option, value, bound);
+}
+
+/// wall_cells -> --wall-cells
+std::string flag_of(std::string key) {
+  std::replace(key.begin(), key.end(), '_', '-');
+  return "--" + key;
+}
+
+Executor executor_of(const std::string& name) {
+  if (name != "auto" && name != "cuda" && name != "host") refuse("--executor", name, "must be auto, cuda or host");
+  if (name == "host") return Executor::host;
+  std::string why_not;
+  if (executor_available(Executor::cuda, &why_not)) return Executor::cuda;
+  if (name == "cuda") throw DeviceAbsent("executor cuda is not available: " + why_not);
+  return Executor::host;
+}
+
+}  // namespace
+
+void BackendFlags::add_to(CLI::App& verb) {
+  for (const gpu::OptionDescription& option : gpu::option_descriptions()) {
+    if (!option.flag) continue;
+    const auto take = [this, key = std::string(option.key)](const std::string& value) { given[key] = value; };
+    verb.add_option_function<std::string>(flag_of(option.key), take,
+                                          fmt::format("of {}: {}; {}", option.backends, option.values, option.help))
+        ->group("Options of backends");
+    if (std::string(option.key) != option.before)
+      verb.add_option_function<std::string>(flag_of(option.before), take)->group("");  // hidden
+  }
+}
+
+std::string BackendFlags::applied_to(const std::string& choice) {
+  std::string all = choice;
+  for (const gpu::OptionDescription& option : gpu::option_descriptions()) {
+    const auto value = given.find(option.key);
+    if (value == given.end() || choice.substr(0, choice.find(':')) != option.backends) continue;
+    all += std::string(":") + option.key + "=" + value->second;
+    ++used_[option.key];
+  }
+  return all;
+}
+
+void BackendFlags::require_used() const {
+  for (const gpu::OptionDescription& option : gpu::option_descriptions())
+    if (given.count(option.key) && !used_.count(option.key))
+      refuse(flag_of(option.key).c_str(), given.at(option.key), std::string("only with --backend ") + option.backends);
+}
+
+std::vector<std::string> backend_choices() {
+  std::vector<std::string> names = backend_names();
+  names.insert(names.begin(), "reference");
+  return names;
+}
+
+std::unique_ptr<Backend> choose_backend(const std::string& choice, const std::string& executor) {
+  const auto colon = choice.find(':');
+  const std::string name = choice.substr(0, colon);
+  const std::string options = colon == std::string::npos ? "" : choice.substr(colon + 1);
+  const auto choices = backend_choices();
+  if (std::find(choices.begin(), choices.end(), name) == choices.end())
+    refuse("--backend", name, fmt::format("must be one of {}", fmt::join(choices, ", ")));
+  if (name != "reference") return make_backend(name, executor_of(executor), options);
+  if (executor == "cuda") refuse("--executor", executor, "the reference runs on the host only");
+  if (executor != "auto" && executor != "host") (void)executor_of(executor);
+  if (!options.empty() && options != "all-pairs") refuse("--backend", choice, "reference or reference:all-pairs");
+  return make_reference_backend(options.empty() ? NeighborSearch::cells : NeighborSearch::all_pairs);
+}
+
+}  // namespace decant

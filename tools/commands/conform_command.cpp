@@ -1,0 +1,380 @@
+/// \file
+/// `decant conform`: every asked-for backend on every asked-for fixture, a table, a report, a
+/// status.
+#include "oracle/checks/conform.hpp"
+#include "oracle/checks/surroundings.hpp"
+#include "oracle/files/file_aside.hpp"
+#include "oracle/files/fixture_file.hpp"
+#include "oracle/files/report_file.hpp"
+#include "oracle/report/console_table.hpp"
+#include "reference/error.hpp"
+#include "tools/commands/backend_choice.hpp"
+#include "tools/commands/commands.hpp"
+#include "tools/commands/fixture_folder.hpp"
+#include "tools/commands/interruptible.hpp"
+#include "tools/commands/junit.hpp"
+#include "tools/commands/output_place.hpp"
+#include "tools/commands/replay.hpp"
+#include "tools/commands/results_judgement.hpp"
+#include "tools/common/build_provenance.hpp"
+#include "tools/common/progress.hpp"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <future>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace decant {
+namespace {
+
+struct ConformArguments {
+  BackendFlags flags;
+  std::vector<std::string> fixtures, backends, checks;
+  std::string executor = "auto", report, junit, surroundings, explain;
+  std::string results, oracle, name;
+  int look_every = 0;
+  bool all = false, list = false, json = false, quiet = false;
+};
+
+// Of what a report shows around its first failing particle, in H.
+constexpr double shown_radius = 6;
+
+constexpr const char* footer =
+    "Without FIXTURE the small recordings beside the binary are judged (or those in the folder "
+    "that\n"
+    "DECANT_FIXTURES names), with --all every one. A check passes where no error exceeds its own\n"
+    "tolerance: score = largest |error| / tolerance <= 1. Checks: fields, substep, contact, advanced,\n"
+    "trajectory, mass, containment, determinism, conservation, invariance, status.\n"
+    "Exit status: 0 all pass, 1 something does not conform, 2 bad input, 3 something could not "
+    "run\n"
+    "(a backend that breaks down while it is judged does not conform),\n"
+    "77 the device of --executor is absent, 130 after Ctrl-C (143: SIGTERM): what was judged by then is in\n"
+    "table and report, the rest is not_run.\n"
+    "\n"
+    "--results judges fields that were computed elsewhere: what is given must pass; what is not given\n"
+    "is not_run in the report and leaves the exit status alone (3 where nothing is given).\n"
+    "\n"
+    "Example:\n"
+    "  decant conform --backend brute --report build/conform.h5";
+
+/// A backend that was asked for, or why it is not there.
+struct Candidate {
+  std::unique_ptr<Backend> backend;
+  BackendInfo info;
+  std::string why_not;
+  bool device_absent = false;
+};
+
+Candidate candidate_of(const std::string& name, const std::string& executor) {
+  Candidate c;
+  c.info.name = name;
+  c.info.executor = executor;
+  try {
+    c.backend = choose_backend(name, executor);
+    c.info = c.backend->info();
+  } catch (const DeviceAbsent& error) {
+    c.why_not = error.what();
+    c.device_absent = true;
+  } catch (const BackendError& error) {
+    c.why_not = error.what();
+  }
+  return c;
+}
+
+std::vector<Candidate> candidates_of(ConformArguments& arguments) {
+  std::vector<std::string> names = arguments.backends;
+  if (names.empty()) {
+    names = backend_choices();
+    std::erase(names, "reference");
+  }
+  if (names.empty()) throw InputError("command line", "--backend", "none", "this build has no backend under test");
+  std::set<std::string> seen;
+  std::vector<Candidate> candidates;
+  for (const auto& name : names) {
+    if (!seen.insert(name).second) throw InputError("command line", "--backend", name, "each backend once");
+    candidates.push_back(candidate_of(arguments.flags.applied_to(name), arguments.executor));
+  }
+  arguments.flags.require_used();
+  return candidates;
+}
+
+/// All are read before the first is judged: a bad one is refused before any work.
+std::vector<Fixture> fixtures_of(const ConformArguments& arguments) {
+  std::vector<std::filesystem::path> files;
+  for (const auto& given : arguments.fixtures) files.push_back(recording_called(given));
+  if (!files.empty() && arguments.all) throw InputError("command line", "--all", "given", "either --all or FIXTURE");
+  if (files.empty()) files = fixtures_in(fixture_folder(), arguments.all);
+  std::vector<Fixture> fixtures;
+  for (const auto& file : files) fixtures.push_back(read_fixture(file));
+  return fixtures;
+}
+
+CheckRow row_that_did_not_run(const Candidate& candidate, const Fixture& fixture, const std::string& why) {
+  CheckRow row;
+  row.backend = candidate.info.name;
+  row.executor = candidate.info.executor;
+  row.device = candidate.info.device;
+  row.fixture = fixture.name;
+  row.check = "all";
+  row.reason = why;
+  return row;
+}
+
+/// Adds the rows of all, pair by pair. \param judged  pairs of backend and fixture whose rows are there
+void judge_all(std::vector<Candidate>& candidates, const std::vector<Fixture>& fixtures, const CheckSelection& checks,
+               int look_every, bool quiet, Interruptible& work, Report& report, std::int64_t& judged) {
+  const auto total = static_cast<std::int64_t>(candidates.size() * fixtures.size());
+  const bool any =
+      std::any_of(candidates.begin(), candidates.end(), [](const Candidate& c) { return c.backend != nullptr; });
+  Progress progress("judgement", total, 0, quiet);
+  // The oracle is sequential: it works on the next fixture while backends are judged on this one.
+  const auto prepared = [&](std::size_t k) {
+    return std::async(std::launch::async,
+                      [&, k] { return std::make_unique<const Judgement>(prepare(fixtures[k], checks, look_every)); });
+  };
+  std::future<std::unique_ptr<const Judgement>> next;
+  if (any && !fixtures.empty()) next = prepared(0);
+  for (std::size_t k = 0; k < fixtures.size(); ++k) {
+    const Fixture& fixture = fixtures[k];
+    std::unique_ptr<const Judgement> oracle;
+    if (any) work.part([&] { oracle = next.get(); });
+    if (any && k + 1 < fixtures.size()) next = prepared(k + 1);
+    for (Candidate& candidate : candidates) {
+      progress.update(judged, fixture.name + " " + candidate.info.name);
+      if (!candidate.backend) {
+        report.rows.push_back(row_that_did_not_run(candidate, fixture, candidate.why_not));
+        ++judged;
+        continue;
+      }
+      std::vector<CheckRow> rows;
+      work.part([&] {
+        rows = judge(*candidate.backend, fixture, *oracle, checks);
+        for (CheckRow& row : rows) condense(row);
+      });
+      for (CheckRow& row : rows) {
+        if (!report.surroundings && is_located(row))
+          report.surroundings = surroundings_of(fixture, oracle->walls, oracle->own.fields.density, row,
+                                                static_cast<std::int64_t>(report.rows.size()),
+                                                shown_radius * fixture.scene.support_radius());
+        report.rows.push_back(std::move(row));
+      }
+      ++judged;
+    }
+  }
+  progress.update(total);
+}
+
+/// What was asked for and is not there is in the report too.
+void add_what_was_not_judged(const std::vector<Candidate>& candidates, const std::vector<Fixture>& fixtures,
+                             std::int64_t judged, Report& report) {
+  std::int64_t pair = 0;
+  for (const Fixture& fixture : fixtures)
+    for (const Candidate& candidate : candidates)
+      if (pair++ >= judged) report.rows.push_back(row_that_did_not_run(candidate, fixture, "interrupted"));
+}
+
+void add_provenance(Report& report, const std::vector<Candidate>& candidates, const std::vector<Fixture>& fixtures) {
+  auto& p = report.provenance;
+  p.merge(build_provenance());
+  for (const auto& c : candidates)
+    p["device." + c.info.name] = c.backend ? c.info.executor + ": " + c.info.device : c.why_not;
+  for (const auto& f : fixtures) p["fixture_sha256." + f.name] = f.sha256;
+}
+
+/// 77 where nothing fails and all that is missing is the device that was asked for.
+int status_of(const Report& report, const std::vector<Candidate>& candidates) {
+  const int status = exit_status(report);
+  const bool only_the_device = std::all_of(candidates.begin(), candidates.end(),
+                                           [](const Candidate& c) { return c.backend || c.device_absent; });
+  const bool absent =
+      std::any_of(candidates.begin(), candidates.end(), [](const Candidate& c) { return c.device_absent; });
+  return status == exit_failure && absent && only_the_device ? exit_device_absent : status;
+}
+
+std::string json_text(const Report& report, const std::vector<Replay>& replays, const std::string& line, int status) {
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array(), files = rows;
+  for (const auto& r : report.rows)
+    rows.push_back({{"backend", r.backend},
+                    {"options", r.options},
+                    {"executor", r.executor},
+                    {"device", r.device},
+                    {"fixture", r.fixture},
+                    {"check", r.check},
+                    {"field", r.field},
+                    {"unit", r.unit},
+                    {"n", r.n},
+                    {"value", r.value},
+                    {"tolerance", r.tolerance},
+                    {"score", r.score},
+                    {"median_score", r.median_score},
+                    {"float_score", r.float_score},
+                    {"worst_id", r.worst_id},
+                    {"worst_component", r.worst_component},
+                    {"got", r.got},
+                    {"expected", r.expected},
+                    {"worst_position", {r.worst_x, r.worst_y, r.worst_z}},
+                    {"fluid_neighbors", r.fluid_neighbors},
+                    {"wall_neighbors", r.wall_neighbors},
+                    {"nearest", r.nearest},
+                    {"excluded", r.excluded},
+                    {"verdict", to_string(judged_verdict(r))},
+                    {"reason", judged_reason(r)}});
+  for (const auto& replay : replays) files.push_back({{"row", replay.row}, {"file", replay.file.string()}});
+  const nlohmann::ordered_json all = {{"summary", line},
+                                      {"exit_status", status},
+                                      {"rows", rows},
+                                      {"surroundings", files},
+                                      {"provenance", report.provenance}};
+  return all.dump(2);
+}
+
+/// Names of all recordings, those of study scale marked.
+int list_recordings() {
+  const auto small = fixtures_in(fixture_folder(), false);
+  for (const auto& file : fixtures_in(fixture_folder(), true))
+    fmt::print("{}{}\n", file.stem().string(),
+               std::find(small.begin(), small.end(), file) == small.end() ? "  (with --all)" : "");
+  return exit_pass;
+}
+
+/// What a check compares, its bound and where that comes from, in lines a terminal holds.
+int explain(const std::string& name) {
+  const auto chosen = parse_checks({name});
+  for (const auto& check : check_descriptions()) {
+    if (!chosen.count(check.name)) continue;
+    fmt::print("{}\n{}", check.name, wrapped(check.compares, 2));
+    fmt::print("bound\n{}", wrapped(check.bound, 2));
+    fmt::print("does not see\n{}", wrapped(check.blind, 2));
+  }
+  return exit_pass;
+}
+
+void write_replays(const std::vector<Replay>& replays, const Report& report, const std::vector<Fixture>& fixtures,
+                   bool talks) {
+  for (const Replay& replay : replays) {
+    const CheckRow& row = report.rows[replay.row];
+    const auto fixture =
+        std::find_if(fixtures.begin(), fixtures.end(), [&](const Fixture& f) { return f.name == row.fixture; });
+    std::filesystem::create_directories(replay.file.parent_path());
+    std::string warning;
+    const std::string line = write_replay(replay.file, *fixture, row, warning);
+    if (talks) fmt::print("{}\n", line);
+    if (!warning.empty()) fmt::print(stderr, "warning: {}: {}\n", replay.file.string(), warning);
+  }
+}
+
+/// Prints what was asked for and writes the report.
+int hand_over(const ConformArguments& arguments, const Report& report, const std::vector<Replay>& replays, int status,
+              const std::string& table, const std::string& line) {
+  if (arguments.json) fmt::print("{}\n", json_text(report, replays, line, status));
+  else if (arguments.quiet) fmt::print("{}\n", line);
+  else fmt::print("{}", table);
+  std::fflush(stdout);
+  // After the table: what was found out is not lost with a full disk.
+  if (!arguments.report.empty()) write_report(arguments.report, report);
+  if (!arguments.report.empty() && !arguments.json && !arguments.quiet)
+    fmt::print("\nreport: {} (a page of it: tools/python/report_html.py)\n", arguments.report);
+  if (!arguments.junit.empty()) write_text_file(arguments.junit, junit_xml(report));
+  return status;
+}
+
+int conform_results(const ConformArguments& arguments) {
+  if (arguments.results.empty())
+    throw InputError("command line", "--results", "not given", "required with --oracle and --name");
+  if (!arguments.backends.empty() || arguments.all || arguments.executor != "auto")
+    throw InputError("command line", "--results", arguments.results,
+                     "instead of --backend, --executor and --all: nothing is run");
+  if (!arguments.surroundings.empty())
+    throw InputError("command line", "--reproducers", arguments.surroundings, "not with --results");
+  arguments.flags.require_used();
+  check_output_place("--report", arguments.report);
+  const ResultsOutcome outcome =
+      judge_results_file({arguments.results, arguments.fixtures, arguments.oracle, arguments.name, arguments.checks});
+  return hand_over(arguments, outcome.report, {}, outcome.status, outcome.table, outcome.line);
+}
+
+int conform(ConformArguments& arguments) {
+  if (!arguments.explain.empty()) return explain(arguments.explain);
+  if (arguments.list) return list_recordings();
+  if (!arguments.results.empty() || !arguments.oracle.empty() || !arguments.name.empty())
+    return conform_results(arguments);
+  const CheckSelection checks = arguments.checks.empty() ? all_checks() : parse_checks(arguments.checks);
+  check_output_place("--report", arguments.report);
+  check_output_place("--junit", arguments.junit);
+  check_output_folder("--reproducers", arguments.surroundings);
+  auto candidates = candidates_of(arguments);
+  const auto fixtures = fixtures_of(arguments);
+  const bool talks = !arguments.quiet && !arguments.json;
+  Report report;
+  std::int64_t judged = 0;
+  const auto hand_over_all = [&](int status, const std::vector<Replay>& replays, const std::string& more) {
+    add_provenance(report, candidates, fixtures);
+    hand_over(arguments, report, replays, status, "\n" + console_table(report) + more,
+              verdict_line(report) + (more.empty() ? "" : "\n" + more.substr(0, more.size() - 1)));
+  };
+  Interruptible work([&] {
+    add_what_was_not_judged(candidates, fixtures, judged, report);
+    const auto all = static_cast<std::int64_t>(candidates.size() * fixtures.size());
+    const std::string line = interrupted_line(judged, all, "judged");
+    report.provenance["interrupted"] = line;
+    if (talks) fmt::print(stderr, "\n");
+    hand_over_all(Interruptible::exit_status(), {}, line + "\n");
+  });
+  if (talks)
+    for (const auto& c : candidates)
+      fmt::print("{}: {}\n", c.info.name,
+                 c.backend ? fmt::format("{} on {}", c.info.executor, c.info.device) : c.why_not);
+  std::fflush(stdout);
+  judge_all(candidates, fixtures, checks, arguments.look_every, !talks, work, report, judged);
+  const int status = status_of(report, candidates);
+  std::vector<Replay> replays;
+  if (!arguments.surroundings.empty()) replays = replays_of(report, arguments.surroundings);
+  hand_over_all(status, replays, "");
+  write_replays(replays, report, fixtures, talks);
+  return status;
+}
+
+}  // namespace
+
+void add_conform_command(CLI::App& app, int& exit_status) {
+  auto arguments = std::make_shared<ConformArguments>();
+  CLI::App* verb = app.add_subcommand("conform", "judge backends on recorded states");
+  verb->footer(footer);
+  verb->add_option("FIXTURE", arguments->fixtures, "recordings, by file or by name; default: the small ones");
+  verb->add_flag("--all", arguments->all, "the study-scale recordings too");
+  verb->add_flag("--list", arguments->list, "print the names of all recordings; judges nothing");
+  verb->add_option("--backend", arguments->backends, "brute,…; default: all under test")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  verb->add_option("--executor", arguments->executor, "auto, cuda or host")->capture_default_str();
+  verb->add_option("--check", arguments->checks, "fields,substep,…; default: all")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  verb->add_option("--explain", arguments->explain,
+                   "say what a check compares and why its bound is what it is; judges nothing");
+  arguments->flags.add_to(*verb);
+  verb->add_option("--results", arguments->results,
+                   "judge this file's fields (oracle/formats/results.md) instead of a backend");
+  verb->add_option("--oracle", arguments->oracle, "their own reference, for --results of their own states");
+  verb->add_option("--name", arguments->name, "what the report calls --results; default: its file");
+  verb->add_option("--check-every", arguments->look_every,
+                   "check mass and containment every so many substeps of a run; 1 names the first "
+                   "substep; default: at ever shorter intervals")
+      ->check(CLI::Range(1, 1000000));
+  verb->add_option("--look-every", arguments->look_every)->check(CLI::Range(1, 1000000))->group("");
+  verb->add_option("--report", arguments->report, "write an HDF5 report");
+  verb->add_option("--junit", arguments->junit, "write JUnit XML, for CI");
+  verb->add_option("--surroundings", arguments->surroundings)->group("");
+  verb->add_option("--reproducers", arguments->surroundings,
+                   "folder for fixtures of the fluid around failing particles");
+  verb->add_flag("--json", arguments->json, "rows as JSON instead of the table");
+  verb->add_flag("--quiet", arguments->quiet, "the verdict's line alone");
+  verb->callback([arguments, &exit_status] { exit_status = conform(*arguments); });
+}
+
+}  // namespace decant

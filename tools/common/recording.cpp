@@ -1,0 +1,19 @@
+/// \file
+/// The oracle at work on a state to be written.
+#include "tools/common/recording.hpp"
+
+#include "oracle/checks/conform.hpp"
+#include "reference/sampling.hpp"
+
+namespace decant {
+
+std::string record_answer(Fixture& fixture, std::int64_t ensemble_substeps, std::int64_t ensemble_members) {
+  fixture.state.quantise();
+  std::string weakness =
+      evaluate_oracle(fixture.scene, fixture.state, fixture.fields.emplace(), fixture.condition.emplace());
+  fixture.ensemble =
+      run_ensemble(fixture.scene, sample_walls(fixture.scene), fixture.state, ensemble_substeps, ensemble_members);
+  return weakness;
+}
+
+}  // namespace decant

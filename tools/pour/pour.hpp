@@ -1,0 +1,61 @@
+/// \file
+/// One pour from its first frame to its last: solver, audit, frames, timeline, checkpoints. Knows
+/// no command line, so that tests can pour with any backend.
+///
+/// What lies in the output folder: frames.h5, frames.xdmf, walls.xdmf, timeline.h5, csv/ when all
+/// is done; frames.h5.partial and checkpoint.h5 as long as it is not.
+#pragma once
+
+#include "oracle/backend.hpp"
+#include "reference/scene.hpp"
+#include "reference/state.hpp"
+#include "tools/pour/limits.hpp"
+#include "tools/pour/timeline.hpp"
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <vector>
+
+namespace decant {
+
+struct PourResult;
+
+struct PourOptions {
+  std::filesystem::path out;
+  bool csv = false, resume = false, quiet = false;
+  double checkpoint_seconds = 30;  // s, wall time between checkpoints; 0: as often as can be
+  /// Asked after every stretch of a frame; true: leave a checkpoint and return. Where `leave` is given, asked
+  /// by another thread too.
+  std::function<bool()> stop;
+  /// Ends the process where a call of the backend's is still under way half a second after a stop: called
+  /// by another thread when the checkpoint is written, with what there is to say. `frame` is −1 where there
+  /// is no checkpoint yet.
+  std::function<void(const PourResult&)> leave;
+  std::uint32_t perturbation = 0;  // not 0: from perturbed_start with this seed
+};
+
+struct PourResult {
+  bool finished = false;     // false: stopped, a checkpoint lies in the folder
+  std::int64_t frame = 0;    // the last one written
+  std::int64_t substep = 0;  // of the checkpoint, maybe within the next frame
+  std::vector<LimitExceeded> limits_exceeded;
+  Timeline timeline;
+  PourSummary summary;
+};
+
+/// Pours. Throws InputError where the folder holds another pour or the disk has no room;
+/// BackendError where the backend reports trouble, naming particle and substep, after dumping the
+/// last good state to failed-state.h5 in the folder; std::runtime_error where a file cannot be
+/// written.
+PourResult pour(const Scene& scene, Backend& backend, const PourOptions& options);
+
+/// Every coordinate changed by a random part, up to 2⁻²². Pours that differ in nothing else show how far
+/// apart their ends may be.
+ParticleState perturbed_start(ParticleState state, std::uint32_t seed);
+
+/// The scene written in `frames` frames over the same time. Substeps that the scene sets become as
+/// many as keep each of them no longer than it was; derived ones are derived anew.
+Scene with_frames(Scene scene, int frames);
+
+}  // namespace decant

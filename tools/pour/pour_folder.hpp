@@ -1,0 +1,36 @@
+/// \file
+/// The output folder of a pour: its files, whether it may be poured into, and whether there is room.
+#pragma once
+
+#include "tools/frames/frame_file.hpp"
+#include "tools/pour/pour.hpp"
+
+#include <cstdint>
+#include <filesystem>
+
+namespace decant {
+
+/// The files of one output folder.
+struct PourFiles {
+  explicit PourFiles(const std::filesystem::path& folder)
+      : frames(folder / "frames.h5"),
+        partial(folder / "frames.h5.partial"),
+        checkpoint(folder / "checkpoint.h5"),
+        timeline(folder / "timeline.h5"),
+        frames_xdmf(folder / "frames.xdmf"),
+        walls_xdmf(folder / "walls.xdmf"),
+        csv(folder / "csv"),
+        failed(folder / "failed-state.h5") {}
+
+  std::filesystem::path frames, partial, checkpoint, timeline, frames_xdmf, walls_xdmf, csv, failed;
+};
+
+/// Refuses a folder that a new pour would overwrite, or that has nothing to resume. Throws InputError.
+void check_pour_folder(const PourOptions& options, const PourFiles& files);
+
+/// Compares what the pour still needs with what the disk has, and says so. Throws InputError where the
+/// disk has less. \param frames_done  frames that are written already
+void check_room(const PourOptions& options, const PourFiles& files, const FrameLayout& layout,
+                std::int64_t frames_done);
+
+}  // namespace decant

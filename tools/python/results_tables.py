@@ -1,0 +1,323 @@
+#!/usr/bin/env python3
+"""Fills the tables of measured results in Markdown documents from the files in fixtures/results.
+
+A document marks each table: <!-- results: NAME --> … <!-- /results -->. What stands between is replaced, with
+device and revision in the line below the table. --check changes nothing and exits with 1 where a document
+differs from its data; --list names the tables."""
+
+import argparse
+import difflib
+import json
+import re
+import sys
+from pathlib import Path
+
+import h5py
+
+from option_names import current
+
+ROOT = Path(__file__).resolve().parents[2]
+RESULTS = ROOT / "fixtures" / "results"
+PHASES = ("settled", "tilt-onset", "stream", "splash", "filling", "rest")
+
+
+def text(value):
+    return value.decode() if isinstance(value, bytes) else str(value)
+
+
+def table(heading, rows):
+    lines = ["| " + " | ".join(heading) + " |", "|" + "---|" * len(heading)]
+    return "\n".join(lines + ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows])
+
+
+def source(path, device, revision):
+    return f"\n\n{device}, revision {revision} (`{path.relative_to(ROOT)}`)."
+
+
+def device_of(said):
+    return re.sub(r"^cuda: |, CUDA driver.*$", "", said)
+
+
+def bench(name):
+    path = RESULTS / "h200" / f"{name}.json"
+    data = json.loads(path.read_text(encoding="utf-8"))
+    device = device_of(data["rows"][0]["device"])
+    return data["rows"], source(path, device, data["provenance"]["git_revision"])
+
+
+def renamed(backend):
+    name, _, options = backend.partition(":")
+    return ":".join(filter(None, [name, current(options)]))
+
+
+def significant(x, digits=3):
+    """1234.5 -> 1,230"""
+    rounded = float(f"{x:.{digits}g}")
+    return f"{rounded:,.0f}" if rounded >= 10 ** (digits - 1) else f"{rounded:.{digits}g}"
+
+
+def verdicts():
+    """Largest score of some recordings by backend."""
+    path = RESULTS / "h200" / "conformance.h5"
+    with h5py.File(path) as file:
+        rows = {
+            name: file[f"summary/{name}"][:] for name in ("backend", "fixture", "score", "check", "field", "verdict")
+        }
+        provenance = {k: text(v) for k, v in file["provenance"].attrs.items()}
+    backends = sorted({text(b) for b in rows["backend"]})
+    fixtures = sorted({text(f) for f in rows["fixture"]})
+    shown = []
+    for fixture in ("hostile-crowd", "hostile-periodic", "motion-drum", "pour-4k-stream", "pour-56k-filling"):
+        cells = []
+        for backend in backends:
+            of = (rows["fixture"] == fixture.encode()) & (rows["backend"] == backend.encode())
+            passed = (rows["verdict"][of] == b"pass").all()
+            cells.append(f"{'pass' if passed else 'FAIL'}, {rows['score'][of].max():.3f}")
+        of = rows["fixture"] == fixture.encode()
+        worst = rows["score"][of].argmax()
+        shown.append([f"`{fixture}`", *cells, f"{text(rows['check'][of][worst])}, {text(rows['field'][of][worst])}"])
+    passed = (rows["verdict"] == b"pass").all()
+    last = (
+        f"\n\nAll {len(fixtures)} recordings × {len(backends)} backends, {len(rows['score']):,} rows: "
+        + ("pass" if passed else "FAIL")
+        + f", largest score {rows['score'].max():.3f}. "
+    )
+    return (
+        table(["recording", *(f"`{b}`" for b in backends), "largest in"], shown)
+        + last
+        + source(path, device_of(provenance["device.hash"]), provenance["git_revision"]).strip()
+    )
+
+
+LADDER = [
+    ("brute", "all pairs"),
+    ("hash:wall_cells=off:force_neighbors=recomputed:sort=thrust", "hash, every wall particle tested, Thrust sort"),
+    (
+        "hash:moving_walls=rebuilt:force_neighbors=recomputed:sort=thrust",
+        "+ a grid for the fluid and one per container, the moving one rebuilt",
+    ),
+    ("hash:moving_walls=rebuilt:force_neighbors=recomputed", "+ counting sort, substeps captured as a CUDA graph"),
+    ("hash:force_neighbors=recomputed", "+ moving walls looked up in their own frame"),
+    ("hash", "+ pairs cached for the force pass (the default)"),
+    ("list:build=all-pairs:rebuild=10", "list from all pairs, every 10 substeps"),
+    ("list:rebuild=10", "list from cells, every 10 substeps (may miss pairs)"),
+    ("list:criterion=relative", "list, rebuilt by relative displacement"),
+    ("list", "list, rebuilt by displacement (the default)"),
+    ("reference", "the sequential reference, one core"),
+    ("reference:all-pairs", "the same by all pairs"),
+]
+
+
+def substep_times():
+    rows, where = bench("bench")
+    times = {(renamed(f"{r['backend']}:{r['options']}"), r["window"]): r["substep_us"] for r in rows}
+    shown = [
+        [f"`{name}`", what, *(significant(times[name, w]) if (name, w) in times else "" for w in ("stream", "filling"))]
+        for name, what in LADDER
+        if any((name, w) in times for w in ("stream", "filling"))
+    ]
+    particles = next(r["particles"] for r in rows)
+    return (
+        f"µs per substep, {particles:,} fluid and {rows[0]['wall_particles']:,} wall particles:\n\n"
+        + table(["backend", "what", "stream", "filling"], shown)
+        + where
+    )
+
+
+def scaling():
+    columns, wheres = {}, []
+    for name in ("bench", "large", "larger"):
+        rows, where = bench(name)
+        wheres.append(where.strip())
+        for r in rows:
+            if not r["options"] and r["backend"] in ("hash", "list") and r["window"] == "filling":
+                columns.setdefault(r["particles"], {})[r["backend"]] = r
+    shown = []
+    for backend in ("hash", "list"):
+        rates = [
+            f"{r['particles'] / r['substep_us'] / 1e3:.2f}" for r in (columns[n][backend] for n in sorted(columns))
+        ]
+        sizes = [f"{columns[n][backend]['device_bytes_per_particle']:.0f}" for n in sorted(columns)]
+        shown.append([f"`{backend}`", *rates, ", ".join(sizes)])
+    return (
+        table(["10⁹ particle-substeps per second", *(f"{n:,}" for n in sorted(columns)), "bytes per particle"], shown)
+        + "\n\n"
+        + "\n".join(wheres)
+    )
+
+
+def pours():
+    shown, wheres = [], []
+    for backend in ("brute", "hash", "list"):
+        path = RESULTS / "h200" / f"pour-56k-{backend}.json"
+        d = json.loads(path.read_text(encoding="utf-8"))
+        regions = d["places"]
+        shown.append(
+            [
+                f"`{backend}`",
+                significant(d["substep_us"]),
+                *(
+                    f"{100 * regions[r]['fraction']:.3f} %"
+                    for r in ("receiver", "source", "in_flight", "spilled", "lost")
+                ),
+                d["wall_crossings"],
+            ]
+        )
+        wheres.append(source(path, device_of(d["device"]), d["provenance"]["git_revision"]).strip())
+    return (
+        table(
+            ["backend", "µs per substep", "receiver", "source", "in flight", "spilled", "lost", "through a wall"], shown
+        )
+        + "\n\n"
+        + "\n".join(wheres)
+    )
+
+
+def drift_rows():
+    path = RESULTS / "h200" / "drift" / "drift-56k.h5"
+    with h5py.File(path) as file:
+        rows = {name: data[:] for name, data in file["rows"].items()}
+        provenance = {k: text(v) for k, v in file["provenance"].attrs.items()}
+    rows["phase"] = [text(f).partition("@")[2] for f in rows["fixture"]]
+    device = device_of(provenance.get("device", provenance.get("device.list", "NVIDIA H200")))
+    return rows, source(path, device, provenance["git_revision"])
+
+
+def stale_lists():
+    rows, where = drift_rows()
+    index = {
+        (p, int(i), round(float(s), 2)): k
+        for k, (p, i, s) in enumerate(zip(rows["phase"], rows["interval"], rows["skin"]))
+    }
+    shown = []
+    for phase in PHASES:
+        k = index[phase, 10, 0.0]
+        every = index[phase, 1, 0.0]
+        auto = next(j for (p, i, _), j in index.items() if p == phase and i == 0)
+        shown.append(
+            [
+                phase,
+                f"{100 * rows['worst_missed_share'][k]:.2f} %",
+                f"{100 * rows['acceleration_rms'][k]:.2g} %",
+                *(f"{rows['substep_us'][j]:.0f}" for j in (k, auto, every)),
+            ]
+        )
+    return (
+        table(
+            [
+                "phase",
+                "pairs missed, at most",
+                "acceleration, RMS error",
+                "µs per substep",
+                "adaptive",
+                "every substep",
+            ],
+            shown,
+        )
+        + where
+    )
+
+
+def campaigns():
+    shown = []
+    for folder in ("h200", "host"):
+        path = RESULTS / folder / "fuzz.h5"
+        with h5py.File(path) as file:
+            a, t = file.attrs, file["tallies"]
+            backends = sorted({renamed(text(b)) for b in t["backend"][:]} - {"scene"})
+            shown.append(
+                [
+                    device_of(text(a["device"])),
+                    ", ".join(backends),
+                    f"{int(a['cases']):,}",
+                    len(file["findings/seed"]),
+                    f"{a['cases'] / a['seconds']:.0f}",
+                    text(file["provenance"].attrs["git_revision"]),
+                ]
+            )
+    return table(["device", "backends", "cases", "counterexamples", "cases per second", "revision"], shown)
+
+
+def faults():
+    """What the last lines of the tables say."""
+    shown = []
+    for what, path in (
+        ("planted, host", "host/faults.txt"),
+        ("planted, H200", "h200/faults.txt"),
+        ("held out, host", "host/heldout.txt"),
+        ("mutations, host", "host/mutants.txt"),
+    ):
+        lines = (RESULTS / path).read_text(encoding="utf-8").strip().split("\n")
+        revision = next((m[1] for line in lines[:3] if (m := re.search(r"revision ([0-9a-f]{7})", line))), "")
+        shown.append([what, lines[-1], revision, f"`fixtures/results/{path}`"])
+    return table(["faults", "outcome", "revision", "file"], shown)
+
+
+def gates():
+    path = RESULTS / "h200" / "validation" / "validation.h5"
+    with h5py.File(path) as file:
+        q, runs = file["quantities"], file["runs"]
+        case = [text(runs["case"][k]) for k in q["run"][:]]
+        verdict = [text(v) for v in q["verdict"][:]]
+        revision, device = text(file["provenance"].attrs["git_revision"]), device_of(text(runs["device"][0]))
+    shown = []
+    for name in dict.fromkeys(case):
+        of = [v for c, v in zip(case, verdict) if c == name]
+        shown.append([f"`{name}`", of.count("pass"), of.count("fail"), of.count("reported")])
+    shown.append(["all", verdict.count("pass"), verdict.count("fail"), verdict.count("reported")])
+    return table(["case", "gates met", "missed", "reported without a gate"], shown) + source(path, device, revision)
+
+
+TABLES = {
+    "verdicts": verdicts,
+    "substep-times": substep_times,
+    "scaling": scaling,
+    "pours": pours,
+    "stale-lists": stale_lists,
+    "campaigns": campaigns,
+    "faults": faults,
+    "gates": gates,
+}
+BLOCK = re.compile(r"(<!-- results: ([a-z-]+) -->\n).*?(<!-- /results -->)", re.DOTALL)
+
+
+def filled(document, path):
+    def block(match):
+        if match[2] not in TABLES:
+            sys.exit(f"{path}: results: {match[2]}: one of {', '.join(TABLES)}")
+        return f"{match[1]}\n{TABLES[match[2]]()}\n\n{match[3]}"
+
+    return BLOCK.sub(block, document)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("document", nargs="*", type=Path, help="default: every Markdown file with a marked table")
+    parser.add_argument("--check", action="store_true", help="change nothing; exit with 1 where text and data differ")
+    parser.add_argument("--list", action="store_true", help="names of the tables")
+    arguments = parser.parse_args()
+    if arguments.list:
+        print("\n".join(TABLES))
+        return 0
+    documents = arguments.document or [
+        p for folder in ("*.md", "*/*.md", "fixtures/results/*.md") for p in sorted(ROOT.glob(folder))
+    ]
+    differ = 0
+    for path in documents:
+        before = path.read_text(encoding="utf-8")
+        after = filled(before, path)
+        if before == after:
+            continue
+        differ += 1
+        if arguments.check:
+            sys.stdout.writelines(
+                difflib.unified_diff(before.splitlines(True), after.splitlines(True), str(path), "its data")
+            )
+        else:
+            path.write_text(after, encoding="utf-8")
+            print(f"{path}: filled in")
+    return 1 if arguments.check and differ else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
