@@ -24,7 +24,7 @@ struct BackendInfo {
   std::string precision;  // "fp32" or "fp64"
 };
 
-/// Trouble met on the way. A status that is not ok makes every result of the backend unusable.
+/// Errors met on the way. A status that is not ok makes every result of the backend unusable.
 struct Status {
   enum Bit : std::uint32_t { non_finite = 1, escaped = 2, capacity = 4, missed_pair = 8 };
   std::uint32_t bits = 0;

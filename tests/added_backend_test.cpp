@@ -18,8 +18,8 @@ TEST(AddedBackend, IsJudgedLikeTheOthers) {
   for (const char* name : {"hostile-crowd", "hostile-periodic", "hostile-cell-faces"}) {
     const Fixture fixture = read_fixture(std::string(DECANT_SOURCE_DIR "/fixtures/") + name + ".h5");
     int rows = 0;
-    for (const CheckRow& row : judge(*backend, fixture, prepare(fixture))) {
-      EXPECT_EQ(judged_verdict(row), Verdict::pass) << name << ": " << row.check << " " << row.field;
+    for (const CheckRow& row : run_checks(*backend, fixture, prepare_reference(fixture))) {
+      EXPECT_EQ(verdict_of(row), Verdict::pass) << name << ": " << row.check << " " << row.field;
       ++rows;
     }
     EXPECT_GT(rows, 30) << name;

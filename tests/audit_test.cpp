@@ -27,19 +27,19 @@ ParticleState at_rest(const Eigen::Matrix3Xd& x, std::int64_t substep = 0) {
   return state;
 }
 
-Place place_of(const Vec3& x) {
+Region place_of(const Vec3& x) {
   Audit audit(two_cups());
-  return static_cast<Place>(audit.look(at_rest(x)).place.at(0));
+  return static_cast<Region>(audit.sample(at_rest(x)).region.at(0));
 }
 
 TEST(Audit, TellsThePlacesApart) {
-  EXPECT_EQ(place_of(Vec3(-0.3, 0, 0.35)), Place::source);
-  EXPECT_EQ(place_of(Vec3(0, 0.05, 0.02)), Place::receiver);
-  EXPECT_EQ(place_of(Vec3(-0.15, 0, 0.35)), Place::in_flight);
-  EXPECT_EQ(place_of(Vec3(0, 0, 0.15)), Place::in_flight) << "above the receiver";
-  EXPECT_EQ(place_of(Vec3(0.4, 0, -0.495)), Place::spilled);
-  EXPECT_EQ(place_of(Vec3(0.4, 0, 1.5)), Place::lost);
-  EXPECT_EQ(place_of(Vec3(0, std::numeric_limits<double>::quiet_NaN(), 0)), Place::lost);
+  EXPECT_EQ(place_of(Vec3(-0.3, 0, 0.35)), Region::source);
+  EXPECT_EQ(place_of(Vec3(0, 0.05, 0.02)), Region::receiver);
+  EXPECT_EQ(place_of(Vec3(-0.15, 0, 0.35)), Region::in_flight);
+  EXPECT_EQ(place_of(Vec3(0, 0, 0.15)), Region::in_flight) << "above the receiver";
+  EXPECT_EQ(place_of(Vec3(0.4, 0, -0.495)), Region::spilled);
+  EXPECT_EQ(place_of(Vec3(0.4, 0, 1.5)), Region::lost);
+  EXPECT_EQ(place_of(Vec3(0, std::numeric_limits<double>::quiet_NaN(), 0)), Region::lost);
 }
 
 TEST(Audit, CountsEveryParticleOnce) {
@@ -47,10 +47,10 @@ TEST(Audit, CountsEveryParticleOnce) {
     const Scene scene = two_cups();
     Audit audit(scene);
     const int n = integer(0, 300);
-    const AuditResult seen = audit.look(at_rest(any_cloud(n, -1.2, 1.2)));
+    const AuditResult seen = audit.sample(at_rest(any_cloud(n, -1.2, 1.2)));
     std::int64_t all = 0;
     double mass = 0;
-    for (std::size_t p = 0; p < place_names.size(); ++p) {
+    for (std::size_t p = 0; p < region_names.size(); ++p) {
       all += seen.particles_at[p];
       mass += seen.mass_at[p];
     }
@@ -66,8 +66,8 @@ TEST(Audit, FollowsTheSourceAsItTilts) {
   Audit audit(scene);
   for (std::int64_t substep = 0; substep <= last; ++substep) {
     const Pose pose = pose_at(scene.containers[0], scene.time_at(substep));
-    const AuditResult seen = audit.look(at_rest(pose.to_world(inside), substep));
-    EXPECT_EQ(seen.place[0], static_cast<std::uint8_t>(Place::source)) << substep;
+    const AuditResult seen = audit.sample(at_rest(pose.to_world(inside), substep));
+    EXPECT_EQ(seen.region[0], static_cast<std::uint8_t>(Region::source)) << substep;
     EXPECT_EQ(seen.crossed, 0) << "it rests while the cup moves";
   }
   EXPECT_GT(
@@ -80,7 +80,7 @@ TEST(Audit, SeesAParticleInAWallAndHowDeep) {
   Eigen::Matrix3Xd x(3, 2);
   x.col(0) = Vec3(0, 0, 0.05);
   x.col(1) = Vec3(0.107, 0, 0.05);  // 7 mm into the receiver's wall
-  const AuditResult seen = audit.look(at_rest(x));
+  const AuditResult seen = audit.sample(at_rest(x));
   EXPECT_EQ(seen.inside, 1);
   EXPECT_EQ(seen.deepest_particle, 1);
   EXPECT_NEAR(seen.deepest, 0.007, 1e-12);
@@ -91,8 +91,8 @@ TEST(Audit, SeesAWayThroughAWallWhoseEndsAreBothFree) {
   const Vec3 inside(0.08, 0, 0.05), outside(0.17, 0, 0.05), below(0, 0, -0.06), above(0.12, 0, 0.2);
   const auto crossings = [](const Vec3& from, const Vec3& to) {
     Audit audit(two_cups());
-    EXPECT_EQ(audit.look(at_rest(from, 0)).crossed, 0);
-    const AuditResult seen = audit.look(at_rest(to, 1));
+    EXPECT_EQ(audit.sample(at_rest(from, 0)).crossed, 0);
+    const AuditResult seen = audit.sample(at_rest(to, 1));
     EXPECT_EQ(seen.inside, 0);
     EXPECT_EQ(seen.first_crossed, seen.crossed > 0 ? 0 : -1);
     return seen.crossed;
@@ -109,8 +109,8 @@ TEST(Audit, SeesAWallThatSweepsOverARestingParticle) {
   // In the source, near the wall that the tilt brings towards it.
   const Vec3 x = scene.containers[0].origin + Vec3(-0.045, 0, 0.01);
   Audit audit(scene);
-  ASSERT_EQ(audit.look(at_rest(x, 0)).inside, 0);
-  EXPECT_EQ(audit.look(at_rest(x, 60)).crossed, 1);
+  ASSERT_EQ(audit.sample(at_rest(x, 0)).inside, 0);
+  EXPECT_EQ(audit.sample(at_rest(x, 60)).crossed, 1);
 }
 
 TEST(Audit, AddsUpEnergies) {
@@ -119,7 +119,7 @@ TEST(Audit, AddsUpEnergies) {
   Eigen::Matrix3Xd x(3, 2), v(3, 2);
   x << 0, 0.3, 0, 0, 0.05, 0.4;
   v << 3, 0, 4, 0, 0, -2;
-  const AuditResult seen = audit.look(state_of(x, v));
+  const AuditResult seen = audit.sample(state_of(x, v));
   EXPECT_NEAR(seen.kinetic_energy, scene.particle_mass() * (12.5 + 2), 1e-15);
   EXPECT_NEAR(seen.potential_energy, scene.particle_mass() * 9.81 * 0.45, 1e-15);
   EXPECT_EQ(seen.max_speed, 5);

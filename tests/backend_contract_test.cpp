@@ -114,12 +114,12 @@ TEST_P(BackendContract, EvaluatingLeavesTheStateAlone) {
 
 TEST_P(BackendContract, EvaluatingOnTheWayChangesNothing) {
   const Fixture f = test::random_fixture(4);
-  const auto run = [&](bool looks) {
+  const auto run = [&](bool samples) {
     load(f);
     Fields out = Fields::unwritten(f.state.size(), sample_walls(f.scene).size());
-    for (const int stretch : {3, 8, 5}) {
-      EXPECT_TRUE(backend_->advance(stretch).ok());
-      for (int k = 0; looks && k < 2; ++k) EXPECT_TRUE(backend_->evaluate(out).ok());
+    for (const int segment : {3, 8, 5}) {
+      EXPECT_TRUE(backend_->advance(segment).ok());
+      for (int k = 0; samples && k < 2; ++k) EXPECT_TRUE(backend_->evaluate(out).ok());
     }
     return state();
   };
@@ -135,7 +135,7 @@ TEST_P(BackendContract, TwoStretchesAreOneLongOne) {
   ASSERT_TRUE(backend_->advance(3).ok());
   ASSERT_TRUE(backend_->advance(4).ok());
   if (GetParam().name.starts_with("list")) {
-    // Lists are made anew where a stretch begins, which changes the order of sums.
+    // Lists are made anew where a segment begins, which changes the order of sums.
     EXPECT_EQ(state().substep, whole.substep);
     EXPECT_LE((state().position - whole.position).cwiseAbs().maxCoeff(), 1e-5 * f.scene.particle_spacing);
   } else {

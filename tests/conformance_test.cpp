@@ -25,11 +25,11 @@ namespace decant {
 namespace {
 
 /// Every row that did not pass, in words; empty where all did.
-std::string objections(Backend& backend, const Fixture& fixture, const Judgement& oracle,
+std::string objections(Backend& backend, const Fixture& fixture, const PreparedReference& oracle,
                        const CheckSelection& checks) {
   std::string all;
-  for (const CheckRow& row : judge(backend, fixture, oracle, checks))
-    if (judged_verdict(row) != Verdict::pass)
+  for (const CheckRow& row : run_checks(backend, fixture, oracle, checks))
+    if (verdict_of(row) != Verdict::pass)
       all += row.check + " " + row.field + ": score " + std::to_string(row.score) + " at " +
              std::to_string(row.worst_id) + " " + row.reason + "\n";
   return all;
@@ -37,7 +37,7 @@ std::string objections(Backend& backend, const Fixture& fixture, const Judgement
 
 std::string objections(Backend& backend, const Fixture& fixture) {
   const CheckSelection checks{"fields", "substep"};
-  return objections(backend, fixture, *std::make_unique<Judgement>(prepare(fixture, checks)), checks);
+  return objections(backend, fixture, *std::make_unique<PreparedReference>(prepare_reference(fixture, checks)), checks);
 }
 
 /// A fixture of the state with the oracle's answer, as `record` makes it.
@@ -49,14 +49,14 @@ Fixture answered(Fixture fixture) {
 TEST(Fixtures, AreReproducedByTheReferenceOfToday) {
   const auto files = fixtures_in(fixture_folder(), false);
   EXPECT_GE(files.size(), 6u);
-  for (const auto& file : files) EXPECT_NO_THROW(prepare(read_fixture(file), {"fields"})) << file;
+  for (const auto& file : files) EXPECT_NO_THROW(prepare_reference(read_fixture(file), {"fields"})) << file;
 }
 
 TEST(Fixtures, AreRefusedWhereTheReferenceSaysOtherwise) {
   Fixture fixture = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-rest.h5");
   fixture.fields->density[100] *= 1 + 1e-13;
   try {
-    prepare(fixture);
+    prepare_reference(fixture);
     FAIL() << "accepted";
   } catch (const InputError& error) {
     EXPECT_EQ(error.key(), "density[100]");
@@ -90,7 +90,7 @@ TEST_P(Conformance, HoldsInEveryCheck) {
   CheckSelection checks = all_checks();
   if (may_miss) checks.erase("trajectory");
   static const Fixture fixture = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-splash.h5");
-  static const Judgement oracle = prepare(fixture);
+  static const PreparedReference oracle = prepare_reference(fixture);
   const auto tested = backend();
   EXPECT_EQ(objections(*tested, fixture, oracle, checks), "");
 }
@@ -182,7 +182,7 @@ TEST(Lists, VerifiedCountWhatTheOracleCounts) {
   for (const std::uint32_t seed : {2u, 3u, 5u, 8u}) {
     const Fixture f = test::random_fixture(seed);
     const Walls walls = sample_walls(f.scene);
-    const WallAnswer volumes = wall_answer(f.scene, walls);
+    const WallSolution volumes = wall_solution(f.scene, walls);
     const StaleList built(f.scene, volumes.volume, look_at(f.scene, walls, volumes, f.state), 0);
     PairTotals expected;
     for (int age = 0; age < 6; ++age) {

@@ -174,11 +174,11 @@ Scores scores(const Scene& scene, const Form& form, int cases) {
 }
 
 TEST(ContactBounds, HoldForEveryLegalForm) {
-  struct Place {
+  struct Region {
     Vec3 origin, pivot;
   };
-  for (const Place& place : {Place{{0, 0, 0}, {0.04, 0, 0.03}}, Place{{-0.3, -0.2, -0.25}, {-0.28, -0.2, -0.22}},
-                             Place{{0.3, 0.1, 0.2}, {5, -8, 12}}})
+  for (const Region& place : {Region{{0, 0, 0}, {0.04, 0, 0.03}}, Region{{-0.3, -0.2, -0.25}, {-0.28, -0.2, -0.22}},
+                              Region{{0.3, 0.1, 0.2}, {5, -8, 12}}})
     for (int k = 0; k < 8; ++k) {
       const Form form{(k & 1) != 0, (k & 2) != 0, (k & 4) != 0};
       const Scores s = scores(cup_scene(place.origin, place.pivot), form, 4000);

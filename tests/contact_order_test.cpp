@@ -4,7 +4,7 @@
 #include "reference/scene_checks.hpp"
 #include "reference/shapes.hpp"
 #include "reference/solver.hpp"
-#include "tools/fuzz/genome.hpp"
+#include "tools/fuzz/case.hpp"
 
 #include <gtest/gtest.h>
 
@@ -69,7 +69,7 @@ TEST(OrderOfContact, WouldBeSeenWereTheyNearerThanTwoContactDistances) {
 TEST(OrderOfContact, OfContainersIsNotSeenInFuzzedProblemsEither) {
   int several = 0;
   for (std::uint64_t seed = 1; seed <= 300; ++seed) {
-    const Fixture f = fuzz::problem_of(fuzz::random_genome(seed), "fuzz");
+    const Fixture f = fuzz::fixture_of(fuzz::random_case(seed), "fuzz");
     if (f.scene.containers.size() < 2) continue;
     ++several;
     const auto [forward, backward] = both_orders(f.scene, f.state);

@@ -231,7 +231,7 @@ class Series : public testing::Test {
   Series()
       : fixture_(test::random_fixture(4)),
         walls_(sample_walls(fixture_.scene)),
-        volumes_(wall_answer(fixture_.scene, walls_)),
+        volumes_(wall_solution(fixture_.scene, walls_)),
         file_(folder_ / "series.h5"),
         out_(std::make_unique<Hdf5Writer>(file_)) {
     fixture_.name = "random";
@@ -287,7 +287,7 @@ class Series : public testing::Test {
   test::TemporaryFolder folder_;
   Fixture fixture_;
   Walls walls_;
-  WallAnswer volumes_;
+  WallSolution volumes_;
   std::filesystem::path file_;
   std::unique_ptr<Hdf5Writer> out_;
   std::vector<Instant> instants_;

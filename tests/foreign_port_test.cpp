@@ -21,7 +21,7 @@ class ForeignPort : public test::ResultsFile {
  protected:
   void SetUp() override {
     if (!test::python_has("h5py")) GTEST_SKIP() << "no h5py in " << test::python() << "; ci/setup makes it";
-    setenv("PYTHONPATH", (root + "/tools").c_str(), 1);  // for scripts that import the writers
+    setenv("PYTHONPATH", (root + "/tools/python").c_str(), 1);  // for scripts that import the writers
     write_port_inputs(inputs_file(), *fixture_, *oracle_);
   }
   static std::filesystem::path inputs_file() { return *folder_ / "inputs.h5"; }
@@ -112,7 +112,7 @@ write_results(sys.argv[2], {"force": got[order]}, id=order + 1)
 )";
   const auto judged_with = [&](const std::string& factor) {
     EXPECT_EQ(test::run_python({script.string(), reference_file().string(), results_file().string(), factor}), 0);
-    return judge_results_file({results_file(), {}, reference_file(), "port", {}}).status;
+    return check_results_file({results_file(), {}, reference_file(), "port", {}}).status;
   };
   EXPECT_EQ(judged_with("1"), 0);
   EXPECT_EQ(schema_of(reference_file()), 0);

@@ -350,7 +350,7 @@ Fields evaluate_by(const Forms& forms, const Scene& scene, const Walls& walls, c
   return out;
 }
 
-std::map<std::string, double> scores(const Fields& got, const OracleAnswer& oracle) {
+std::map<std::string, double> scores(const Fields& got, const ReferenceSolution& oracle) {
   std::map<std::string, double> worst;
   const auto score = [&](const char* name, const auto& values, const auto& expected, const auto& tau) {
     double& most = worst[name];

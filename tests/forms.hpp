@@ -43,6 +43,6 @@ Fields evaluate_by(const Forms& forms, const Scene& scene, const Walls& walls, c
 Fixture random_form_case(std::uint32_t seed);
 
 /// Largest |error| / tolerance of each real field.
-std::map<std::string, double> scores(const Fields& got, const OracleAnswer& oracle);
+std::map<std::string, double> scores(const Fields& got, const ReferenceSolution& oracle);
 
 }  // namespace decant::test

@@ -16,23 +16,23 @@ using test::Forms;
 struct Problem {
   Fixture fixture;
   Walls walls;
-  WallAnswer volumes;
-  OracleAnswer own, given;
+  WallSolution volumes;
+  ReferenceSolution own, given;
   StageInputs staged;
 
   explicit Problem(Fixture f)
       : fixture(std::move(f)),
         walls(sample_walls(fixture.scene)),
-        volumes(wall_answer(fixture.scene, walls)),
-        own(answer(fixture.scene, walls, volumes, fixture.state)) {
+        volumes(wall_solution(fixture.scene, walls)),
+        own(reference_solution(fixture.scene, walls, volumes, fixture.state)) {
     staged.density = own.fields.density.cast<float>().cast<double>();
     staged.pressure = own.fields.pressure.cast<float>().cast<double>();
-    given = answer(fixture.scene, walls, volumes, fixture.state, &staged);
+    given = reference_solution(fixture.scene, walls, volumes, fixture.state, &staged);
   }
   void expect_within(const Forms& forms) const {
     std::string text = fixture.name;
     for (const auto& [name, value] : test::choices(forms)) text += ", " + name + ": " + value;
-    const auto expect = [&](const OracleAnswer& oracle, const StageInputs* inputs) {
+    const auto expect = [&](const ReferenceSolution& oracle, const StageInputs* inputs) {
       const Fields got = test::evaluate_by(forms, fixture.scene, walls, fixture.state, inputs);
       for (const auto& [field, score] : test::scores(got, oracle))
         EXPECT_LE(score, 1) << field << (inputs ? ", staged; " : "; ") << text;

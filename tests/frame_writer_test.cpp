@@ -36,7 +36,7 @@ Frame awkward_frame(const Scene& scene, const FrameLayout& layout, std::int64_t 
   fields.density.setConstant(1000.0 / 3.0);
   fields.pressure.setLinSpaced(particles, -1.0, 1.0);
   AuditResult audit;
-  audit.place.assign(particles, static_cast<std::uint8_t>(Place::receiver));
+  audit.region.assign(particles, static_cast<std::uint8_t>(Region::receiver));
   return make_frame(scene, layout, index, state, fields, audit);
 }
 

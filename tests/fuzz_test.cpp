@@ -1,5 +1,5 @@
 /// \file
-/// Fuzzing itself: problems are sound and of all kinds, faults are found and shrunk, campaigns are the
+/// Fuzzing itself: problems are sound and of all kinds, faults are found and minimised, campaigns are the
 /// same however they are run.
 #include "oracle/files/fixture_file.hpp"
 #include "tools/fuzz/campaign.hpp"
@@ -39,14 +39,14 @@ Settings settings_of(std::int64_t cases, const std::set<std::string>& names) {
 
 TEST(Genomes, AreTheSameForASeedAndOthersForTheNext) {
   for (std::uint64_t seed = 1; seed < 200; ++seed) {
-    EXPECT_EQ(random_genome(seed), random_genome(seed));
-    EXPECT_FALSE(random_genome(seed) == random_genome(seed + 1)) << seed;
+    EXPECT_EQ(random_case(seed), random_case(seed));
+    EXPECT_FALSE(random_case(seed) == random_case(seed + 1)) << seed;
   }
 }
 
 TEST(Genomes, MakeSoundScenes) {
   for (std::uint64_t seed = 1; seed <= 500; ++seed) {
-    const Fixture f = problem_of(random_genome(seed), "fuzz");
+    const Fixture f = fixture_of(random_case(seed), "fuzz");
     EXPECT_NO_THROW(check_scene(f.scene, "fuzz")) << seed;
     ParticleState rounded = f.state;
     rounded.quantise();
@@ -56,28 +56,28 @@ TEST(Genomes, MakeSoundScenes) {
 
 TEST(Genomes, AreOfAllKindsThatPortsTripOver) {
   constexpr int count = 600;
-  std::array<int, class_names.size()> seen{};
+  std::array<int, tag_names.size()> seen{};
   for (std::uint64_t seed = 1; seed <= count; ++seed) {
-    const Classes c = classes_of(problem_of(random_genome(seed), "fuzz"));
+    const Tags c = tags_of(fixture_of(random_case(seed), "fuzz"));
     for (std::size_t k = 0; k < c.size(); ++k) seen[k] += c[k];
   }
   for (std::size_t k = 0; k < seen.size(); ++k) {
     // No kind is so rare that a thousand problems could miss it, and none is all there is.
-    EXPECT_GT(seen[k], count / 50) << class_names[k];
-    EXPECT_LT(seen[k], count * 19 / 20) << class_names[k];
+    EXPECT_GT(seen[k], count / 50) << tag_names[k];
+    EXPECT_LT(seen[k], count * 19 / 20) << tag_names[k];
   }
 }
 
-/// Shrunk cases of campaigns that showed a mistake, of a backend or of the judgement.
+/// Minimised cases of campaigns that showed a mistake, of a backend or of the checks.
 TEST(Campaign, WhatItOnceFoundIsSettled) {
   int count = 0;
   for (const auto& entry : std::filesystem::directory_iterator(DECANT_SOURCE_DIR "/fixtures/found")) {
     if (entry.path().extension() != ".h5") continue;
     const Fixture fixture = read_fixture(entry.path());
-    const Judgement oracle = prepare(fixture);
+    const PreparedReference oracle = prepare_reference(fixture);
     for (const char* name : {"brute", "hash", "list", "list:criterion=relative"})
-      for (const CheckRow& row : judge(*on_host(name), fixture, oracle))
-        EXPECT_EQ(judged_verdict(row), Verdict::pass)
+      for (const CheckRow& row : run_checks(*on_host(name), fixture, oracle))
+        EXPECT_EQ(verdict_of(row), Verdict::pass)
             << fixture.name << " " << name << " " << row.check << " " << row.field << ": " << row.reason;
     ++count;
   }
@@ -85,26 +85,26 @@ TEST(Campaign, WhatItOnceFoundIsSettled) {
 }
 
 /// Where a push, or a floor, leaves a particle on a wall's very surface, fp32 may have it a distance's rounding
-/// inside. Found by seeds 1196 and 1244; both shrunk to one particle below a tank.
+/// inside. Found by seeds 1196 and 1244; both minimised to one particle below a tank.
 TEST(Campaign, HoldsAParticleOnASurfaceToTheRoundingOfADistance) {
-  Genome pushed;
+  Case pushed;
   pushed.layers = 1;
   pushed.vessels = {Vessel{}};
   pushed.contact = -5;  // at the surface
   pushed.points = {{{3 * fine, fine, -2 * fine}, {}}};
-  Genome held = pushed;
+  Case held = pushed;
   held.contact = 0;  // at dx/4
   held.floor = 1;
   held.floor_gap = 4;  // sixteenths of dx below the tank: contact with the floor ends on the tank
   held.points = {{{0, 5 * fine, -3 * fine}, {}}};
-  for (const Genome& genome : {pushed, held}) {
-    Fixture f = problem_of(genome, "surface");
+  for (const Case& fuzz_case : {pushed, held}) {
+    Fixture f = fixture_of(fuzz_case, "surface");
     f.ensemble.substeps = run_substeps;
-    const Judgement oracle = prepare(f, {"containment"});
+    const PreparedReference oracle = prepare_reference(f, {"containment"});
     EXPECT_EQ(oracle.deepest, 0);
     const auto fails = [&](Backend& backend) {
-      for (const CheckRow& row : judge(backend, f, oracle, {"containment"}))
-        if (judged_verdict(row) != Verdict::pass) return true;
+      for (const CheckRow& row : run_checks(backend, f, oracle, {"containment"}))
+        if (verdict_of(row) != Verdict::pass) return true;
       return false;
     };
     for (const char* name : {"brute", "hash", "list"}) EXPECT_FALSE(fails(*on_host(name))) << name;
@@ -123,13 +123,13 @@ TEST(Campaign, FindsNothingInWhatIsRight) {
   EXPECT_EQ(c.cases, 48);
   EXPECT_LT(c.undecidable, 5);
   std::set<std::string> asked;
-  for (const Tally& t : c.tallies) {
+  for (const PropertyStatistics& t : c.statistics) {
     EXPECT_EQ(t.failed, 0) << t.property << " " << t.backend << ": seed " << t.worst_seed;
     EXPECT_GT(t.asked, 0);
     asked.insert(t.property);
   }
   EXPECT_EQ(asked, all_properties());
-  EXPECT_TRUE(c.findings.empty());
+  EXPECT_TRUE(c.counterexamples.empty());
 }
 
 TEST(Campaign, IsTheSameWithAnyNumberOfThreads) {
@@ -140,12 +140,12 @@ TEST(Campaign, IsTheSameWithAnyNumberOfThreads) {
     s.threads = c == &one ? 1 : 3;
     *c = run_campaign(s, on_host);
   }
-  ASSERT_EQ(one.tallies.size(), two.tallies.size());
-  EXPECT_EQ(one.classes, two.classes);
-  for (std::size_t k = 0; k < one.tallies.size(); ++k) {
-    EXPECT_EQ(one.tallies[k].worst, two.tallies[k].worst);
-    EXPECT_EQ(one.tallies[k].worst_seed, two.tallies[k].worst_seed);
-    EXPECT_EQ(one.tallies[k].histogram, two.tallies[k].histogram);
+  ASSERT_EQ(one.statistics.size(), two.statistics.size());
+  EXPECT_EQ(one.tags, two.tags);
+  for (std::size_t k = 0; k < one.statistics.size(); ++k) {
+    EXPECT_EQ(one.statistics[k].worst, two.statistics[k].worst);
+    EXPECT_EQ(one.statistics[k].worst_seed, two.statistics[k].worst_seed);
+    EXPECT_EQ(one.statistics[k].histogram, two.statistics[k].histogram);
   }
 }
 
@@ -164,20 +164,20 @@ TEST(Campaign, ShrinksAFaultToWhatShowsItAndWritesThatDown) {
   s.backends = {"reference"};
   s.failures = folder / "failing";
   const Campaign c = run_campaign(s, with_a_fault);
-  ASSERT_EQ(c.findings.size(), 1u);
-  const Finding& found = c.findings[0];
+  ASSERT_EQ(c.counterexamples.size(), 1u);
+  const Counterexample& found = c.counterexamples[0];
   EXPECT_EQ(found.outcome.property, "fields");
   EXPECT_NE(found.outcome.reason.find("density"), std::string::npos) << found.outcome.reason;
-  EXPECT_EQ(found.genome.points.size(), 3u);
+  EXPECT_EQ(found.fuzz_case.points.size(), 3u);
   EXPECT_GT(found.found_particles, 3u);
-  EXPECT_TRUE(found.genome.vessels.empty());
-  EXPECT_EQ(found.genome.kernel, 0);
+  EXPECT_TRUE(found.fuzz_case.vessels.empty());
+  EXPECT_EQ(found.fuzz_case.kernel, 0);
   // What was written fails again, and only with the fault.
   const Fixture fixture = read_fixture(found.file);
-  const Judgement oracle = prepare(fixture, {"fields"});
+  const PreparedReference oracle = prepare_reference(fixture, {"fields"});
   const auto fails = [&](Backend& backend) {
-    for (const CheckRow& row : judge(backend, fixture, oracle, {"fields"}))
-      if (judged_verdict(row) != Verdict::pass) return true;
+    for (const CheckRow& row : run_checks(backend, fixture, oracle, {"fields"}))
+      if (verdict_of(row) != Verdict::pass) return true;
     return false;
   };
   EXPECT_TRUE(fails(*with_a_fault("")));
@@ -199,8 +199,8 @@ TEST(Campaign, EndsWhereItIsToldToAndKeepsWhatItHas) {
 TEST(Campaign, HandsOnWhatABackendThrows) {
   const auto make = [](const std::string&) -> std::unique_ptr<Backend> { throw BackendError("no device"); };
   const Campaign c = run_campaign(settings_of(3, {"fields"}), make);
-  ASSERT_EQ(c.tallies.size(), 1u);
-  EXPECT_EQ(c.tallies[0].failed, c.tallies[0].asked);
+  ASSERT_EQ(c.statistics.size(), 1u);
+  EXPECT_EQ(c.statistics[0].failed, c.statistics[0].asked);
 }
 
 TEST(Campaign, ReportsAreAsDocumentedAndMerge) {
@@ -214,13 +214,13 @@ TEST(Campaign, ReportsAreAsDocumentedAndMerge) {
   s.first_seed = 7;
   s.backends = {"reference"};
   write_campaign(b, run_campaign(s, with_a_fault), info);
-  const std::string tools = DECANT_SOURCE_DIR "/tools/";
+  const std::string tools = DECANT_SOURCE_DIR "/tools/python/";
   EXPECT_EQ(test::run_python({tools + "merge_fuzz.py", a.string(), b.string(), "--out", all.string()}), 0);
   for (const auto& file : {a, b, all})
     EXPECT_EQ(test::run_python({tools + "check_schema.py", file.string()}), 0) << file;
   const Hdf5Reader merged(all);
   EXPECT_EQ(merged.integer_attribute("/", "cases"), 12);
-  EXPECT_EQ(merged.integers("/findings/seed").size(), 1);
+  EXPECT_EQ(merged.integers("/counterexamples/seed").size(), 1);
   EXPECT_EQ(test::run_python({tools + "merge_fuzz.py", a.string(), a.string(), "--out", all.string()}, true), 2);
 }
 

@@ -160,7 +160,7 @@ TEST(InterruptedCommand, BenchKeepsItsRows) {
   const std::string json = folder / "bench.json";
   const Interrupted end = interrupted(folder, SIGTERM, [&] {
     return command(add_bench_command,
-                   {"bench", fixtures + "pour-56k-stream.h5", "--backend", "reference:all-pairs", "--json", json});
+                   {"bench", fixtures + "pour-56k-stream.h5", "--backend", "reference:all-pairs", "--report", json});
   });
   EXPECT_EQ(end.status, 128 + SIGTERM) << end.out;
   EXPECT_NE(end.out.find("interrupted: 0 of 1 timed"), std::string::npos) << end.out;

@@ -24,7 +24,7 @@ CheckRow row(const std::string& backend, const std::string& check, const std::st
   r.n = 4000;
   r.tolerance = 1e-4;
   r.score = score;
-  r.value = score * r.tolerance;
+  r.error = score * r.tolerance;
   r.worst_id = 17;
   r.verdict = score <= 1 ? Verdict::pass : Verdict::fail;
   if (r.verdict == Verdict::fail) r.reason = "beyond tolerance";
@@ -60,7 +60,7 @@ TEST(Junit, AFailureTellsTheWorstFieldWithParticleValueToleranceAndScore) {
   const std::string xml = junit_xml({{row("brute", "substep", "position", 3), row("brute", "substep", "velocity", 31),
                                       row("brute", "density", "density", 0.1)},
                                      {}});
-  EXPECT_NE(xml.find("message=\"substep / velocity, particle 17: value 0.0031 kg/m^3, tolerance "
+  EXPECT_NE(xml.find("message=\"substep / velocity, particle 17: error 0.0031 kg/m^3, tolerance "
                      "0.0001 kg/m^3, score 31\""),
             std::string::npos)
       << xml;
@@ -72,23 +72,23 @@ TEST(Junit, WhatDidNotRunIsSkippedAndAPassWithoutAScoreFails) {
   CheckRow lie = row("brute", "density", "density", 0.5);
   lie.score = std::numeric_limits<double>::quiet_NaN();
   const std::string xml = junit_xml({{lie, not_run("list")}, {}});
-  EXPECT_NE(xml.find("<skipped message=\"no CUDA device\"/>"), std::string::npos) << xml;
+  EXPECT_NE(xml.find("<skipped message=\"no CUDA device\" />"), std::string::npos) << xml;
   EXPECT_EQ(count(xml, "<failure "), 1u) << xml;
   EXPECT_NE(xml.find(R"(tests="2" failures="1" errors="0" skipped="1")"), std::string::npos) << xml;
 }
 
 TEST(Junit, AnEmptyReportHasNoCases) { EXPECT_NE(junit_xml({}).find(R"(tests="0")"), std::string::npos); }
 
-TEST(XmlEscaped, KeepsTextAndReplacesWhatXmlCannotHold) {
-  EXPECT_EQ(xml_escaped("a<b> & \"c\" 'd'\n\te"), "a&lt;b&gt; &amp; &quot;c&quot; &apos;d&apos;\n\te");
-  EXPECT_EQ(xml_escaped("ρ₀ 𝄞"), "ρ₀ 𝄞");
-  EXPECT_EQ(xml_escaped(std::string("\0\x1b\x7f", 3)), "���");
+TEST(XmlText, KeepsTextAndReplacesWhatXmlCannotHold) {
+  EXPECT_EQ(xml_text("a<b> & \"c\" 'd'\n\te"), "a<b> & \"c\" 'd'\n\te");
+  EXPECT_EQ(xml_text("ρ₀ 𝄞"), "ρ₀ 𝄞");
+  EXPECT_EQ(xml_text(std::string("\0\x1b\x7f", 3)), "���");
   // A byte alone, one that goes on too soon, overlong, a surrogate, a character cut off.
-  EXPECT_EQ(xml_escaped("\xff"), "�");
-  EXPECT_EQ(xml_escaped("\x80z"), "�z");
-  EXPECT_EQ(xml_escaped("\xe0\x80\x80"), "���");
-  EXPECT_EQ(xml_escaped("\xed\xa0\x80"), "���");
-  EXPECT_EQ(xml_escaped("\xf0\x9d"), "��");
+  EXPECT_EQ(xml_text("\xff"), "�");
+  EXPECT_EQ(xml_text("\x80z"), "�z");
+  EXPECT_EQ(xml_text("\xe0\x80\x80"), "���");
+  EXPECT_EQ(xml_text("\xed\xa0\x80"), "���");
+  EXPECT_EQ(xml_text("\xf0\x9d"), "��");
 }
 
 TEST(Junit, IsReadByAnXmlParserWithEveryCharacterInItsPlace) {
@@ -114,7 +114,7 @@ for suite in suites:
 case = suites[0].find("testcase")
 assert case.get("classname") == "b<r> host.pour-4k-rest" and case.get("name") == "density"
 failure = case.find("failure")
-assert failure.get("message").startswith("density / den\"sity', particle 17: value 0.0031 kg/m^3")
+assert failure.get("message").startswith("density / den\"sity', particle 17: error 0.0031 kg/m^3")
 assert "]]> & <!-- \ufffd ρ \ufffd\n" in failure.text, failure.text
 )");
   EXPECT_EQ(test::run_python({(folder / "read.py").string(), (folder / "junit.xml").string()}), 0);

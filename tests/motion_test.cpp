@@ -96,14 +96,14 @@ TEST(Piston, PushesAllFluidAlongAndLetsNoneThrough) {
   ASSERT_NO_THROW(check_scene(s, "column"));
   Solver solver(s, sample_walls(s), initial_state(s));
   Audit audit(s);
-  audit.look(solver.state());
+  audit.sample(solver.state());
   for (int frame = 0; frame < s.schedule.frames; ++frame) {
     for (int k = 0; k < s.schedule.substeps_per_frame; ++k) {
       solver.substep();
       const double face = 2 * s.time_at(solver.state().substep);
       ASSERT_GE(solver.state().position.row(0).minCoeff(), face + s.contact_distance() - 1e-9);
     }
-    const AuditResult seen = audit.look(solver.state());
+    const AuditResult seen = audit.sample(solver.state());
     EXPECT_EQ(seen.crossed, 0);
     EXPECT_EQ(seen.inside, 0);
   }
@@ -122,14 +122,14 @@ TEST(Audit, FollowsAPistonThatSweepsOverARestingParticle) {
   };
   // In 500 substeps of 0.1 ms the piston goes 0.1 m and leaves the particle 50 mm behind its back.
   Audit audit(s);
-  EXPECT_EQ(audit.look(at_rest(0.03, 0)).inside, 0);
-  const AuditResult swept = audit.look(at_rest(0.03, 500));
+  EXPECT_EQ(audit.sample(at_rest(0.03, 0)).inside, 0);
+  const AuditResult swept = audit.sample(at_rest(0.03, 500));
   EXPECT_EQ(swept.inside, 0);
   EXPECT_EQ(swept.crossed, 1);
   // One that goes along is not crossed, nor is one that stays ahead.
   Audit along(s);
-  along.look(at_rest(0.03, 0));
-  EXPECT_EQ(along.look(at_rest(0.13, 500)).crossed, 0);
+  along.sample(at_rest(0.03, 0));
+  EXPECT_EQ(along.sample(at_rest(0.13, 500)).crossed, 0);
 }
 
 TEST(Tank, ThatMovesEvenlyIsOneThatStands) {

@@ -28,7 +28,7 @@ class NamedFields : public test::ResultsFile {
     fill(out);
     out.commit();
   }
-  static ResultsOutcome judged() { return judge_results_file({results_file(), {}, reference_file(), "port", {}}); }
+  static ResultsOutcome judged() { return check_results_file({results_file(), {}, reference_file(), "port", {}}); }
   /// Status where the port's particle 2 is off by `error`.
   int status_off_by(double error) const {
     Eigen::VectorXd off = x_;

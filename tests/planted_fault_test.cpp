@@ -189,7 +189,7 @@ const Fault catalogue[] = {
        edit.evaluated = [calls = 0](const Scene&, Fields& f) mutable { f.density[0] *= 1 + 1e-15 * ++calls; };
        return edit;
      }()},
-    {"OriginTakenForGranted", "invariance", "moved density",
+    {"OriginTakenForGranted", "invariance", "translated density",
      [] {
        Edit edit;
        edit.loaded = [](Scene& scene, ParticleState& s) {
@@ -197,7 +197,7 @@ const Fault catalogue[] = {
        };
        return edit;
      }()},
-    {"TurnedFallsAslant", "invariance", "turned acceleration", scene_edit([](Scene& s) {
+    {"TurnedFallsAslant", "invariance", "rotated acceleration", scene_edit([](Scene& s) {
        if (s.containers[0].origin.x() == 0) s.gravity.y() = 1e-3;
      })},
     {"FirstIdSpecial", "invariance", "permuted density", list_edit([](Neighbors& n) { n.fluid[0].clear(); })},
@@ -209,8 +209,8 @@ class PlantedFault : public testing::TestWithParam<Fault> {
     static const Fixture fixture = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-stream.h5");
     return fixture;
   }
-  static const Judgement& oracle() {
-    static const Judgement prepared = prepare(recorded());
+  static const PreparedReference& oracle() {
+    static const PreparedReference prepared = prepare_reference(recorded());
     return prepared;
   }
   /// The check whose row this is.
@@ -220,9 +220,9 @@ class PlantedFault : public testing::TestWithParam<Fault> {
 TEST_P(PlantedFault, FailsTheCheckThatIsThereForIt) {
   EditedReference backend(GetParam().edit);
   double margin = -1;
-  for (const CheckRow& row : judge(backend, recorded(), oracle(), check_of(GetParam().check)))
+  for (const CheckRow& row : run_checks(backend, recorded(), oracle(), check_of(GetParam().check)))
     if (row.check == GetParam().check && row.field == GetParam().field) {
-      EXPECT_EQ(judged_verdict(row), Verdict::fail) << "score " << row.score;
+      EXPECT_EQ(verdict_of(row), Verdict::fail) << "score " << row.score;
       margin = row.score;
     }
   ASSERT_GT(margin, 1) << "no such check";
@@ -237,10 +237,10 @@ TEST(Containment, NamesTheSubstepWhereAsked) {
     if (s.substep - fixture.state.substep >= 5) s.position.col(20) = Vec3(0, 0, 0.012);
   };
   const CheckSelection alone{"containment"};
-  for (const auto& [look_every, found] : {std::pair(1, "first seen 5 "), std::pair(0, "first seen 9 ")}) {
+  for (const auto& [sample_every, found] : {std::pair(1, "first seen 5 "), std::pair(0, "first seen 9 ")}) {
     EditedReference backend(edit);
     std::string reason;
-    for (const CheckRow& row : judge(backend, fixture, prepare(fixture, alone, look_every), alone))
+    for (const CheckRow& row : run_checks(backend, fixture, prepare_reference(fixture, alone, sample_every), alone))
       if (row.field == "crossings") reason = row.reason;
     EXPECT_NE(reason.find(found), std::string::npos) << reason;
   }
@@ -249,10 +249,10 @@ TEST(Containment, NamesTheSubstepWhereAsked) {
 /// The equation of state alone, and the walls' drag alone, are sharper than whatever follows from a density.
 TEST(SmallestFactors, AreCaughtOnAPour) {
   const Fixture fixture = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-filling.h5");
-  const Judgement oracle = prepare(fixture, {"fields"});
+  const PreparedReference oracle = prepare_reference(fixture, {"fields"});
   const auto score = [&](const Edit& edit, const char* check, const char* field) {
     EditedReference backend(edit);
-    for (const CheckRow& row : judge(backend, fixture, oracle, {"fields"}))
+    for (const CheckRow& row : run_checks(backend, fixture, oracle, {"fields"}))
       if (row.check == std::string(check) && row.field == field) return row.score;
     return -1.0;
   };
@@ -277,7 +277,8 @@ TEST(Trajectory, ShowsAPercentOfViscosityInItsEnergy) {
   for (const char* phase : {"settled", "splash"}) {
     const Fixture fixture = read_fixture(std::string(DECANT_SOURCE_DIR "/fixtures/pour-4k-") + phase + ".h5");
     EditedReference backend(scene_edit([](Scene& s) { s.fluid.viscosity *= 1.01; }));
-    for (const CheckRow& row : judge(backend, fixture, prepare(fixture, {"trajectory"}), {"trajectory"})) {
+    for (const CheckRow& row :
+         run_checks(backend, fixture, prepare_reference(fixture, {"trajectory"}), {"trajectory"})) {
       if (row.field == "energy") {
         EXPECT_GT(row.score, 1) << phase;
       }
@@ -304,8 +305,8 @@ INSTANTIATE_TEST_SUITE_P(Catalogue, PlantedFault, testing::ValuesIn(catalogue),
 TEST(NoFault, PassesEveryCheckFarWithinTolerance) {
   const Fixture fixture = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-stream.h5");
   EditedReference backend{Edit{}};
-  for (const CheckRow& row : judge(backend, fixture, prepare(fixture))) {
-    EXPECT_EQ(judged_verdict(row), Verdict::pass) << row.check << " " << row.field << row.reason;
+  for (const CheckRow& row : run_checks(backend, fixture, prepare_reference(fixture))) {
+    EXPECT_EQ(verdict_of(row), Verdict::pass) << row.check << " " << row.field << row.reason;
     // Double against double: what is left is the order of sums; runs are compared with an ensemble.
     EXPECT_LT(row.score, 1e-3) << row.check << " " << row.field;
   }
@@ -314,7 +315,7 @@ TEST(NoFault, PassesEveryCheckFarWithinTolerance) {
 /// What is left out of a comparison, because fp32 cannot decide it, must be sane all the same.
 TEST(NotANumber, DoesNotHideAmongTheAmbiguous) {
   const Fixture fixture = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-stream.h5");
-  const Judgement oracle = prepare(fixture, {"fields", "substep"});
+  const PreparedReference oracle = prepare_reference(fixture, {"fields", "substep"});
   const auto chosen = [](const std::vector<bool>& ambiguous) {
     return std::find(ambiguous.begin(), ambiguous.end(), true) - ambiguous.begin();
   };
@@ -323,8 +324,8 @@ TEST(NotANumber, DoesNotHideAmongTheAmbiguous) {
   ASSERT_LT(near_wall, fixture.state.size());
   const auto verdict = [&](const Edit& edit, const std::string& field) {
     EditedReference backend(edit);
-    for (const CheckRow& row : judge(backend, fixture, oracle, {"fields", "substep"}))
-      if (row.field == field) return judged_verdict(row);
+    for (const CheckRow& row : run_checks(backend, fixture, oracle, {"fields", "substep"}))
+      if (row.field == field) return verdict_of(row);
     return Verdict::not_run;
   };
   for (const double bad : {nan, 1e30}) {
@@ -339,7 +340,7 @@ TEST(NotANumber, DoesNotHideAmongTheAmbiguous) {
 /// Whatever field a NaN or an infinity is in, and wherever, some check on that field fails.
 TEST(NotANumber, NeverPasses) {
   const Fixture fixture = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-stream.h5");
-  const Judgement oracle = prepare(fixture, {"fields"});
+  const PreparedReference oracle = prepare_reference(fixture, {"fields"});
   const std::vector<std::pair<std::string, Eigen::VectorXd Fields::*>> scalars = {
       {"boundary_volume", &Fields::boundary_volume}, {"density", &Fields::density}, {"pressure", &Fields::pressure}};
   const std::vector<std::pair<std::string, Eigen::Matrix3Xd Fields::*>> vectors = {
@@ -351,8 +352,8 @@ TEST(NotANumber, NeverPasses) {
   const auto expect_fails = [&](const std::string& field, const Edit& edit) {
     EditedReference backend(edit);
     int failed = 0;
-    for (const CheckRow& row : judge(backend, fixture, oracle, {"fields"}))
-      failed += row.field == field && judged_verdict(row) == Verdict::fail;
+    for (const CheckRow& row : run_checks(backend, fixture, oracle, {"fields"}))
+      failed += row.field == field && verdict_of(row) == Verdict::fail;
     EXPECT_GT(failed, 0) << field;
   };
   for (const double bad : {nan, -nan, std::numeric_limits<double>::infinity()}) {

@@ -13,7 +13,7 @@
 #include "tools/common/stop_signal.hpp"
 #include "tools/pour/checkpoint.hpp"
 #include "tools/pour/folder_lock.hpp"
-#include "tools/pour/stretches.hpp"
+#include "tools/pour/segments.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -264,7 +264,7 @@ TEST(StoppedPour, StopsInsideAFrameAndGoesOnThereToTheSameBits) {
       const Checkpoint left = read_checkpoint(out + "/checkpoint.h5");
       EXPECT_EQ(left.frame, 0);
       EXPECT_GE(left.state.substep, before) << backend;
-      EXPECT_EQ(left.state.substep % Stretches::longest, 0);
+      EXPECT_EQ(left.state.substep % Segments::longest, 0);
       ahead += left.state.substep > before;
       before = left.state.substep;
     }
@@ -275,26 +275,26 @@ TEST(StoppedPour, StopsInsideAFrameAndGoesOnThereToTheSameBits) {
 TEST(StoppedPour, InsideAFrameIsResumedToTheSameBitsAndTheSameTimeline) {
   const TemporaryFolder folder;
   Scene scene = small_scene(3);
-  scene.schedule.substeps_per_frame = 260;  // three stretches
+  scene.schedule.substeps_per_frame = 260;  // three segments
   for (const char* name : {"hash", "list"}) {
     const auto backend = [&] { return make_backend(name, Executor::host); };
     PourOptions options;
     options.quiet = true;
     options.out = folder / name / "whole";
     ASSERT_TRUE(pour(scene, *backend(), options).finished);
-    for (const int stretches : {1, 2, 4, 8}) {
-      options.out = folder / name / ("parts" + std::to_string(stretches));
+    for (const int segments : {1, 2, 4, 8}) {
+      options.out = folder / name / ("parts" + std::to_string(segments));
       options.resume = false;
       int asked = 0;
-      options.stop = [&] { return asked++ == stretches; };
+      options.stop = [&] { return asked++ == segments; };
       const PourResult stopped = pour(scene, *backend(), options);
       EXPECT_FALSE(stopped.finished);
-      EXPECT_EQ(stopped.substep, 260 * (stretches / 3) + 260 * (stretches % 3) / 3);
+      EXPECT_EQ(stopped.substep, 260 * (segments / 3) + 260 * (segments % 3) / 3);
       options.stop = {};
       options.resume = true;
       EXPECT_TRUE(pour(scene, *backend(), options).finished);
       EXPECT_TRUE(bytes_of(options.out / "frames.h5") == bytes_of(folder / name / "whole/frames.h5"))
-          << name << ", " << stretches;
+          << name << ", " << segments;
       const Hdf5Reader one(options.out / "timeline.h5"), other(folder / name / "whole/timeline.h5");
       for (const char* column : {"/max_speed", "/deepest", "/kinetic_energy", "/max_density"})
         EXPECT_EQ(one.vector(column), other.vector(column)) << column;
@@ -330,28 +330,28 @@ TEST(ResumedPour, IsThatOfTheSamePerturbation) {
   EXPECT_TRUE(pour(scene, backend, options).finished);
 }
 
-TEST(Stretches, CoverAFrameMeetWhereWallsAreLookedAtAndStayShort) {
+TEST(Segments, CoverAFrameMeetWhereWallsAreLookedAtAndStayShort) {
   Scene scene = test::falling_points_scene(1);
   scene.schedule.substeps_derived = false;
   for (const int substeps : {1, 5, 99, 100, 101, 260, 7919, 1'000'000})
     for (const double speed : {0.1, 3.0, 30.0, 3000.0}) {
       scene.schedule.substeps_per_frame = substeps;
       scene.schedule.max_speed = speed;
-      const Stretches stretches(scene);
-      std::int64_t done = 0, looks = 0;
+      const Segments segments(scene);
+      std::int64_t done = 0, samples = 0;
       while (done < substeps) {
-        ASSERT_TRUE(stretches.meet_at(done));
-        const std::int64_t end = stretches.end_of(done);
+        ASSERT_TRUE(segments.meet_at(done));
+        const std::int64_t end = segments.end_of(done);
         ASSERT_GT(end, done);
-        ASSERT_LE(end - done, Stretches::longest);
-        ASSERT_EQ(stretches.meet_at(end - 1), end - 1 == done) << end << " of " << substeps;
+        ASSERT_LE(end - done, Segments::longest);
+        ASSERT_EQ(segments.meet_at(end - 1), end - 1 == done) << end << " of " << substeps;
         done = end;
-        looks += stretches.looks_at(done);
+        samples += segments.samples_at(done);
       }
       EXPECT_EQ(done, substeps);
-      // 0.04 m of wall, crossed twice at most between two looks.
+      // 0.04 m of wall, crossed twice at most between two samples.
       const double needed = std::min(std::ceil(0.3 * speed / 0.08), double(substeps));
-      EXPECT_EQ(static_cast<double>(looks), std::max(needed, 1.0)) << substeps << " " << speed;
+      EXPECT_EQ(static_cast<double>(samples), std::max(needed, 1.0)) << substeps << " " << speed;
     }
 }
 

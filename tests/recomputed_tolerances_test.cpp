@@ -16,7 +16,7 @@ namespace {
 int status_of(const Fixture& fixture) {
   const test::TemporaryFolder folder;
   const std::filesystem::path inputs = folder / "inputs.h5", file = folder / "report.h5";
-  const Judgement oracle = prepare(fixture, {"fields"});
+  const PreparedReference oracle = prepare_reference(fixture, {"fields"});
   write_port_inputs(inputs, fixture, oracle);
   test::Edit edit;
   edit.evaluated = [](const Scene&, Fields& f) {
@@ -27,7 +27,7 @@ int status_of(const Fixture& fixture) {
   };
   test::EditedReference backend(edit);
   Report report;
-  report.rows = judge(backend, fixture, oracle, {"fields"});
+  report.rows = run_checks(backend, fixture, oracle, {"fields"});
   write_report(file, report);
   return test::run_python({DECANT_SOURCE_DIR "/tests/recompute_tolerances.py", inputs.string(), file.string()});
 }

@@ -28,7 +28,7 @@ CheckRow row(const std::string& check, double score, const std::string& backend 
   r.n = 4000;
   r.tolerance = 1e-4;
   r.score = score;
-  r.value = score * r.tolerance;
+  r.error = score * r.tolerance;
   r.worst_id = 17;
   r.verdict = score <= 1 ? Verdict::pass : Verdict::fail;
   if (r.verdict == Verdict::fail) r.reason = "beyond tolerance";

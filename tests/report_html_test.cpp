@@ -25,9 +25,9 @@ CheckRow row(const std::string& fixture, const std::string& check, double score)
   r.n = 4000;
   r.tolerance = 1e-4;
   r.score = score;
-  r.value = score * r.tolerance;
+  r.error = score * r.tolerance;
   r.median_score = score / 10;
-  r.float_score = 0.3;
+  r.fp32_reference_score = 0.3;
   r.verdict = score <= 1 ? Verdict::pass : Verdict::fail;
   r.score_quantiles.assign(quantile_percent.size(), score / 10);
   r.score_quantiles.back() = score;
@@ -41,7 +41,7 @@ Report failing_report() {
                  row("pour-<56k>", "density", 0.25)};
   CheckRow& failing = report.rows[1];
   failing.worst_id = 17;
-  failing.got = 1003.25;
+  failing.actual = 1003.25;
   failing.expected = 1000.5;
   failing.worst_x = failing.worst_y = failing.worst_z = 0.125;
   failing.fluid_neighbors = 33;
@@ -54,7 +54,7 @@ Report failing_report() {
   missing.reason = "no device";
   report.rows.push_back(missing);
 
-  Surroundings& s = report.surroundings.emplace();
+  Neighborhood& s = report.neighborhood.emplace();
   s.row = 1;
   s.spacing = 0.004;
   s.support_radius = 0.008;
@@ -70,7 +70,7 @@ Report failing_report() {
 class ReportPage : public testing::Test {
  protected:
   void SetUp() override {
-    if (!test::python_has("h5py, matplotlib"))
+    if (!test::python_has("h5py, jinja2, matplotlib"))
       GTEST_SKIP() << "no matplotlib in " << test::python() << "; ci/setup makes it";
   }
   int run() {

@@ -7,6 +7,7 @@
 #include "reference/error.hpp"
 
 #include <gtest/gtest.h>
+#include <hdf5.h>
 
 #include <cmath>
 #include <cstdlib>
@@ -32,9 +33,9 @@ CheckRow row(const std::string& backend, const std::string& fixture, const std::
   r.n = 4000;
   r.tolerance = 1e-4;
   r.score = score;
-  r.value = score * r.tolerance;
+  r.error = score * r.tolerance;
   r.median_score = score / 10;
-  r.float_score = 0.3;
+  r.fp32_reference_score = 0.3;
   r.worst_id = 17;
   r.verdict = score <= 1 ? Verdict::pass : Verdict::fail;
   if (r.verdict == Verdict::fail) r.reason = "score above 1";
@@ -54,8 +55,8 @@ CheckRow not_run(const std::string& backend, const std::string& fixture) {
 /// With arrays of n values whose largest score is the row's.
 CheckRow with_arrays(CheckRow r, Eigen::Index n) {
   r.tolerances = Eigen::VectorXd::Constant(n, r.tolerance);
-  r.error = Eigen::VectorXd::Random(n).cwiseAbs() * (0.9 * r.value);
-  r.error[n / 2] = r.value;
+  r.errors = Eigen::VectorXd::Random(n).cwiseAbs() * (0.9 * r.error);
+  r.errors[n / 2] = r.error;
   return r;
 }
 
@@ -76,7 +77,7 @@ TEST_F(ReportFile, TheSummarysColumnsAreOfEqualLength) {
   for (int k = 0; k < 7; ++k) report.rows.push_back(row("brute", "pour", "density", 0.1 * k));
   write_report(file_, report);
   const Hdf5Reader in(file_);
-  EXPECT_EQ(in.integer_attribute("/", "decant_report"), 2);
+  EXPECT_EQ(in.integer_attribute("/", "decant_report"), 3);
   const auto columns = in.children("/summary");
   EXPECT_EQ(columns.size(), 10u + 1 + 6 + 10 + 9);
   for (const auto& column : columns) EXPECT_EQ(in.shape("/summary/" + column), std::vector<std::int64_t>{7}) << column;
@@ -87,7 +88,7 @@ TEST_F(ReportFile, RowsAndProvenanceComeBack) {
   report.rows = {row("brute", "pour-4k-stream", "density", 0.25), row("hash", "α", "pressure", 30),
                  not_run("list", "pour")};
   report.rows[0].excluded = 3;
-  report.rows[1].got = 1001;
+  report.rows[1].actual = 1001;
   report.rows[1].expected = 1000;
   report.rows[1].worst_component = 2;
   report.rows[1].worst_x = 0.5;
@@ -110,6 +111,37 @@ TEST_F(ReportFile, RowsAndProvenanceComeBack) {
   EXPECT_EQ(back.provenance, report.provenance);
 }
 
+/// As version 0.1 wrote it.
+void make_schema_2(const std::filesystem::path& file) {
+  const hid_t id = H5Fopen(file.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  for (const auto& [now, before] :
+       {std::pair("error", "value"), std::pair("fp32_reference_score", "float_score"), std::pair("actual", "got")})
+    ASSERT_GE(H5Lmove(id, (std::string("/summary/") + now).c_str(), id, (std::string("/summary/") + before).c_str(),
+                      H5P_DEFAULT, H5P_DEFAULT),
+              0);
+  const hid_t schema = H5Aopen(id, "decant_report", H5P_DEFAULT);
+  const std::int64_t two = 2;
+  ASSERT_GE(H5Awrite(schema, H5T_NATIVE_INT64, &two), 0);
+  H5Aclose(schema);
+  H5Fclose(id);
+}
+
+TEST_F(ReportFile, OfTheSchemaBeforeReadsAsToday) {
+  Report report;
+  report.rows = {row("brute", "pour", "density", 0.25), row("hash", "pour", "turned density", 30)};
+  report.rows[1].check = "invariance";
+  report.rows[1].actual = 1001;
+  write_report(file_, report);
+  make_schema_2(file_);
+  const Report back = read_report(file_);
+  ASSERT_EQ(back.rows.size(), 2u);
+  EXPECT_EQ(back.rows[0].field, "density");
+  EXPECT_EQ(back.rows[0].error, report.rows[0].error);
+  EXPECT_EQ(back.rows[0].fp32_reference_score, report.rows[0].fp32_reference_score);
+  EXPECT_EQ(back.rows[1].field, "rotated density");
+  EXPECT_EQ(back.rows[1].actual, 1001);
+}
+
 TEST_F(ReportFile, AnEmptyReportCanBeWrittenAndIsNoPass) {
   write_report(file_, {});
   EXPECT_TRUE(read_report(file_).rows.empty());
@@ -122,9 +154,9 @@ TEST_F(ReportFile, AFailingCheckKeepsItsArraysAndAPassingOneItsQuantiles) {
   Report report;
   report.rows = {with_arrays(row("brute", "pour", "density", 0.5), 1001),
                  with_arrays(row("brute", "pour", "pressure", 30), 1001)};
-  const Eigen::VectorXd error = report.rows[1].error;
+  const Eigen::VectorXd error = report.rows[1].errors;
   for (auto& r : report.rows) condense(r);
-  EXPECT_EQ(report.rows[0].error.size(), 0);
+  EXPECT_EQ(report.rows[0].errors.size(), 0);
   write_report(file_, report);
   const Hdf5Reader in(file_);
   EXPECT_EQ(in.children("/checks"), std::vector<std::string>{"000001"});
@@ -142,7 +174,7 @@ TEST_F(ReportFile, AFailingCheckKeepsItsArraysAndAPassingOneItsQuantiles) {
 
 TEST_F(ReportFile, ANanAmongTheErrorsShowsInTheDistribution) {
   CheckRow r = with_arrays(row("brute", "pour", "density", 0.5), 100);
-  r.error[3] = nan;
+  r.errors[3] = nan;
   condense(r);
   EXPECT_EQ(r.score_quantiles.back(), std::numeric_limits<double>::infinity());
 }
@@ -154,7 +186,7 @@ TEST_F(ReportFile, StaysBelowFifteenMegabytesHoweverMuchFails) {
   for (int k = 0; k < 30; ++k) report.rows.push_back(large);
   CheckRow small = with_arrays(row("hash", "pour-4k-splash", "density", 4), 4000);
   for (int k = 0; k < 3000; ++k) {
-    small.value = k;
+    small.error = k;
     report.rows.push_back(small);
   }
   write_report(file_, report);
@@ -163,21 +195,21 @@ TEST_F(ReportFile, StaysBelowFifteenMegabytesHoweverMuchFails) {
   EXPECT_EQ(in.text_attribute("/checks/000000", "kept"), "whole");
   EXPECT_EQ(in.text_attribute("/checks/000029", "kept"), "worst");
   EXPECT_EQ(in.integers("/checks/000029/index", 256)[0], 84000);
-  EXPECT_EQ(in.vector("/checks/000029/error")[0], static_cast<float>(large.value));
+  EXPECT_EQ(in.vector("/checks/000029/error")[0], static_cast<float>(large.error));
   EXPECT_EQ(in.shape("/summary/score"), std::vector<std::int64_t>{3030});
 }
 
 /// What VTK's reader asks of PolyData: every group of cells, an offset more than cells.
 TEST_F(ReportFile, SurroundingsAreVertices) {
   Report report{{row("brute", "pour", "density", 31)}, {}};
-  Surroundings& s = report.surroundings.emplace();
+  Neighborhood& s = report.neighborhood.emplace();
   s.row = 0;
   s.position = Eigen::Matrix3Xd::Random(3, 5);
   s.id = IdVector::LinSpaced(5, 10, 14);
   s.wall = {0, 0, 0, 1, 1};
   s.density = s.error = s.tolerance = s.score = Eigen::VectorXd::Constant(5, 2.0);
   write_report(file_, report);
-  EXPECT_FALSE(read_report(file_).surroundings);
+  EXPECT_FALSE(read_report(file_).neighborhood);
   const Hdf5Reader in(file_);
   EXPECT_EQ(in.text_attribute("/VTKHDF", "Type"), "PolyData");
   EXPECT_EQ(in.integers("/VTKHDF/NumberOfPoints", 1)[0], 5);
@@ -206,30 +238,29 @@ TEST_F(ReportFile, ADamagedReportIsRefusedByName) {
 }
 
 TEST(ReportVerdict, APassNeedsAScoreBetweenZeroAndOne) {
-  for (const double score : {0.0, 0.5, 1.0})
-    EXPECT_EQ(judged_verdict(row("b", "f", "c", score)), Verdict::pass) << score;
+  for (const double score : {0.0, 0.5, 1.0}) EXPECT_EQ(verdict_of(row("b", "f", "c", score)), Verdict::pass) << score;
   for (const double score : {nan, 1.0 + 1e-15, -0.1, std::numeric_limits<double>::infinity()}) {
     CheckRow r = row("b", "f", "c", 0.5);
     r.score = score;
-    EXPECT_EQ(judged_verdict(r), Verdict::fail) << score;
-    EXPECT_NE(judged_reason(r).find("said to pass with score"), std::string::npos);
+    EXPECT_EQ(verdict_of(r), Verdict::fail) << score;
+    EXPECT_NE(reason_of(r).find("said to pass with score"), std::string::npos);
   }
 }
 
 TEST(ReportVerdict, APassNeedsNumbersForValueAndTolerance) {
   CheckRow r = row("b", "f", "c", 0.5);
-  r.value = nan;
-  EXPECT_EQ(judged_verdict(r), Verdict::fail);
+  r.error = nan;
+  EXPECT_EQ(verdict_of(r), Verdict::fail);
   r = row("b", "f", "c", 0.5);
   r.tolerance = nan;
-  EXPECT_EQ(judged_verdict(r), Verdict::fail);
+  EXPECT_EQ(verdict_of(r), Verdict::fail);
 }
 
 TEST(ReportVerdict, ASkippedOrFailedRowKeepsItsVerdictWhateverItsScore) {
-  EXPECT_EQ(judged_verdict(not_run("b", "f")), Verdict::not_run);
+  EXPECT_EQ(verdict_of(not_run("b", "f")), Verdict::not_run);
   CheckRow r = row("b", "f", "c", 0.5);
   r.verdict = Verdict::fail;
-  EXPECT_EQ(judged_verdict(r), Verdict::fail);
+  EXPECT_EQ(verdict_of(r), Verdict::fail);
 }
 
 TEST(ReportVerdict, TheExitStatusIsZeroOnlyWhereEverythingPassed) {

@@ -8,7 +8,7 @@
 #include "oracle/files/hdf5_io.hpp"
 #include "tests/falling_points.hpp"
 #include "tests/small_fixture.hpp"
-#include "tools/commands/results_judgement.hpp"
+#include "tools/commands/check_results_file.hpp"
 
 #include <gtest/gtest.h>
 
@@ -35,7 +35,7 @@ class ResultsFile : public testing::Test {
     folder_ = std::make_unique<TemporaryFolder>();
     write_fixture(fixture_file(), answered_fixture());
     fixture_ = std::make_unique<Fixture>(read_fixture(fixture_file()));
-    oracle_ = std::make_unique<Judgement>(prepare(*fixture_, {"fields", "substep", "conservation"}));
+    oracle_ = std::make_unique<PreparedReference>(prepare_reference(*fixture_, {"fields", "substep", "conservation"}));
   }
   static void TearDownTestSuite() {
     oracle_.reset();
@@ -55,7 +55,7 @@ class ResultsFile : public testing::Test {
     fill(out);
     out.commit();
   }
-  static ResultsOutcome judged() { return judge_results_file({results_file(), {fixture_file()}, "", "port", {}}); }
+  static ResultsOutcome judged() { return check_results_file({results_file(), {fixture_file()}, "", "port", {}}); }
   /// Asserts that the command refuses the files, naming this key.
   static void expect_refused(const std::function<ResultsOutcome()>& judge, const std::string& key) {
     try {
@@ -73,7 +73,7 @@ class ResultsFile : public testing::Test {
 
   inline static std::unique_ptr<TemporaryFolder> folder_;
   inline static std::unique_ptr<Fixture> fixture_;
-  inline static std::unique_ptr<Judgement> oracle_;
+  inline static std::unique_ptr<PreparedReference> oracle_;
 };
 
 }  // namespace decant::test

@@ -4,6 +4,7 @@
 
 #include "oracle/solution/reference_backend.hpp"
 #include "tests/results_fixture.hpp"
+#include "tools/commands/reproducers.hpp"
 
 #include <cmath>
 
@@ -20,7 +21,7 @@ void put_density(Hdf5Writer& out, const Eigen::VectorXd& density) {
 TEST_F(FixtureResults, AreJudgedAsALinkedBackendIs) {
   const auto backend = make_reference_backend(NeighborSearch::cells);
   const CheckSelection checks = results_checks();
-  std::vector<CheckRow> linked = judge(*backend, *fixture_, *oracle_, checks);
+  std::vector<CheckRow> linked = run_checks(*backend, *fixture_, *oracle_, checks);
   backend->load(fixture_->scene, oracle_->walls, fixture_->state);
   Fields own, staged;
   ASSERT_TRUE(backend->evaluate(own).ok());
@@ -56,7 +57,7 @@ TEST_F(FixtureResults, AreJudgedAsALinkedBackendIs) {
 }
 
 TEST_F(FixtureResults, MayBePartialAndTheRestIsNotRun) {
-  write([&](Hdf5Writer& out) { put_density(out, oracle_->own_float.density); });
+  write([&](Hdf5Writer& out) { put_density(out, oracle_->own_fp32.density); });
   const ResultsOutcome outcome = judged();
   EXPECT_EQ(outcome.status, 0);
   EXPECT_EQ(row_of(outcome, "density", "density").verdict, Verdict::pass);
@@ -78,7 +79,7 @@ TEST_F(FixtureResults, WithNothingInThemAreNotRun) {
 }
 
 TEST_F(FixtureResults, FailByTheParticleThatIsWrong) {
-  Eigen::VectorXd density = oracle_->own_float.density;
+  Eigen::VectorXd density = oracle_->own_fp32.density;
   density[17] *= 1.0001;
   write([&](Hdf5Writer& out) { put_density(out, density); });
   const ResultsOutcome outcome = judged();
@@ -87,8 +88,28 @@ TEST_F(FixtureResults, FailByTheParticleThatIsWrong) {
   EXPECT_EQ(row_of(outcome, "density", "density").worst_id, 17);
 }
 
+TEST_F(FixtureResults, SayWhereTheyFailAndCanBeCutOut) {
+  Eigen::VectorXd density = oracle_->own_fp32.density;
+  density[7] += 10;
+  write([&](Hdf5Writer& out) { put_density(out, density); });
+  const ResultsOutcome outcome = judged();
+  const CheckRow& row = row_of(outcome, "density", "density");
+  ASSERT_EQ(row.worst_id, 7);
+  EXPECT_NEAR(row.worst_x, fixture_->state.position(0, 7), 1e-12);
+  EXPECT_GT(row.fluid_neighbors, 0);
+  const auto files = reproducers_of(outcome.report, *folder_ / "failing");
+  ASSERT_EQ(files.size(), 1u);
+  EXPECT_EQ(files[0].file.filename(), "beaker-port-density-density-7.h5");
+  std::string warning;
+  std::filesystem::create_directories(files[0].file.parent_path());
+  (void)write_reproducer(files[0].file, *fixture_, row, warning);
+  const Fixture around = read_fixture(files[0].file);
+  EXPECT_LE(around.state.size(), fixture_->state.size());
+  EXPECT_GT(around.state.size(), row.fluid_neighbors);
+}
+
 TEST_F(FixtureResults, FailWhereAValueIsNoNumber) {
-  Eigen::VectorXd density = oracle_->own_float.density;
+  Eigen::VectorXd density = oracle_->own_fp32.density;
   density[3] = std::nan("");
   write([&](Hdf5Writer& out) { put_density(out, density); });
   EXPECT_EQ(judged().status, 1);
@@ -118,13 +139,13 @@ TEST_F(FixtureResults, MayNameTheirFixtureByItsParticles) {
   Hdf5Writer out(results_file());
   out.attribute("/", "decant_results", 1);
   out.attribute("/", "particles", static_cast<std::int64_t>(fixture_->state.size()));
-  put_density(out, oracle_->own_float.density);
+  put_density(out, oracle_->own_fp32.density);
   out.commit();
   EXPECT_EQ(judged().status, 0);
 }
 
 TEST_F(FixtureResults, OfAnotherShapeTypeUnitOrNameAreRefused) {
-  const Eigen::VectorXd density = oracle_->own_float.density;
+  const Eigen::VectorXd density = oracle_->own_fp32.density;
   const Eigen::Index n = density.size();
   write([&](Hdf5Writer& out) { put_density(out, density.head(n - 1)); });
   expect_refused(judged, "/fields/density");
@@ -139,7 +160,7 @@ TEST_F(FixtureResults, OfAnotherShapeTypeUnitOrNameAreRefused) {
 }
 
 TEST_F(FixtureResults, InAnotherOrderAreMatchedById) {
-  const Eigen::VectorXd density = oracle_->own_float.density;
+  const Eigen::VectorXd density = oracle_->own_fp32.density;
   const Eigen::Index n = density.size();
   const Eigen::VectorXd backwards = density.reverse();
   write([&](Hdf5Writer& out) {
@@ -152,13 +173,13 @@ TEST_F(FixtureResults, InAnotherOrderAreMatchedById) {
 }
 
 TEST_F(FixtureResults, FailByNameWhereIdsAreMissingOrDoubled) {
-  const Eigen::VectorXd density = oracle_->own_float.density;
+  const Eigen::VectorXd density = oracle_->own_fp32.density;
   const Eigen::Index n = density.size();
   IdVector id = IdVector::LinSpaced(n, 0, n - 1);
   id[5] = 6;
   write([&](Hdf5Writer& out) {
     put_density(out, density);
-    out.vector("/fields/boundary_volume", oracle_->own_float.boundary_volume, "m^3");
+    out.vector("/fields/boundary_volume", oracle_->own_fp32.boundary_volume, "m^3");
     out.integers("/id", id);
   });
   ResultsOutcome outcome = judged();
@@ -174,13 +195,13 @@ TEST_F(FixtureResults, FailByNameWhereIdsAreMissingOrDoubled) {
   });
   outcome = judged();
   EXPECT_EQ(outcome.status, 1);
-  EXPECT_EQ(row_of(outcome, "ids", "id").value, 2);
+  EXPECT_EQ(row_of(outcome, "ids", "id").error, 2);
 }
 
 TEST_F(FixtureResults, NeedOneFixtureAndChecksThatAFileCanAnswer) {
   write([](Hdf5Writer&) {});
-  expect_refused([] { return judge_results_file({results_file(), {}, "", "", {}}); }, "FIXTURE");
-  expect_refused([] { return judge_results_file({results_file(), {fixture_file()}, "", "", {"mass"}}); }, "--check");
+  expect_refused([] { return check_results_file({results_file(), {}, "", "", {}}); }, "FIXTURE");
+  expect_refused([] { return check_results_file({results_file(), {fixture_file()}, "", "", {"mass"}}); }, "--check");
 }
 
 }  // namespace

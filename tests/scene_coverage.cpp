@@ -7,7 +7,7 @@
 #include "reference/pose.hpp"
 #include "reference/scene_file.hpp"
 #include "reference/shapes.hpp"
-#include "tools/fuzz/genome.hpp"
+#include "tools/fuzz/case.hpp"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -283,7 +283,7 @@ Coverage coverage_of_fuzzing(int problems) {
   const auto keys = leaf_keys_of_scenes();
   for (int seed = 1; seed <= problems; ++seed)
     coverage.add(keys,
-                 fuzz::problem_of(fuzz::random_genome(static_cast<std::uint64_t>(seed)), fmt::format("fuzz-{}", seed)));
+                 fuzz::fixture_of(fuzz::random_case(static_cast<std::uint64_t>(seed)), fmt::format("fuzz-{}", seed)));
   return coverage;
 }
 

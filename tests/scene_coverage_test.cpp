@@ -37,7 +37,7 @@ TEST(SceneCoverage, RecordingsVaryEveryKeyThatChangesTheAnswer) {
 
 TEST(SceneCoverage, FuzzingVariesEveryKeyThatChangesTheAnswer) {
   const auto gaps = coverage_of_fuzzing(300).gaps(leaf_keys_of_scenes());
-  EXPECT_TRUE(gaps.empty()) << "vary these in tools/fuzz/genome.cpp and problem.cpp, or say in "
+  EXPECT_TRUE(gaps.empty()) << "vary these in tools/fuzz/case.cpp and case_fixture.cpp, or say in "
                                "keys_without_influence() why they change nothing:\n  "
                             << fmt::format("{}", fmt::join(gaps, "\n  "));
 }

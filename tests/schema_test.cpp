@@ -44,10 +44,10 @@ TEST_F(Schema, AReportIsAsDocumented) {
   CheckRow& whole = report.rows[1];
   whole.verdict = Verdict::fail;
   whole.unit = "Pa";
-  whole.error = Eigen::VectorXd::Constant(9, 2.0);
+  whole.errors = Eigen::VectorXd::Constant(9, 2.0);
   whole.tolerances = Eigen::VectorXd::Constant(9, 1.0);
   report.rows[2] = whole;
-  report.rows[2].error = Eigen::VectorXd::Constant(2'000'000, 2.0);
+  report.rows[2].errors = Eigen::VectorXd::Constant(2'000'000, 2.0);
   report.rows[2].tolerances = Eigen::VectorXd::Constant(2'000'000, 1.0);
   write_report(file_, report);
   EXPECT_EQ(checked(file_), 0);
@@ -68,7 +68,7 @@ TEST_F(Schema, AValidationIsAsDocumented) {
 
 TEST_F(Schema, AReportWithSurroundingsIsAsDocumented) {
   Report report;
-  Surroundings& s = report.surroundings.emplace();
+  Neighborhood& s = report.neighborhood.emplace();
   s.position = Eigen::Matrix3Xd::Random(3, 5);
   s.id = IdVector::LinSpaced(5, 10, 14);
   s.wall = {0, 0, 0, 1, 1};

@@ -15,14 +15,14 @@ namespace {
 
 struct Problem {
   explicit Problem(const Fixture& f)
-      : scene(f.scene), walls(sample_walls(f.scene)), volumes(wall_answer(f.scene, walls)), state(f.state) {}
+      : scene(f.scene), walls(sample_walls(f.scene)), volumes(wall_solution(f.scene, walls)), state(f.state) {}
 
-  Instant look() const { return look_at(scene, walls, volumes, state); }
-  StaleList list(double skin) const { return {scene, volumes.volume, look(), skin}; }
+  Instant sample() const { return look_at(scene, walls, volumes, state); }
+  StaleList list(double skin) const { return {scene, volumes.volume, sample(), skin}; }
 
   Scene scene;
   Walls walls;
-  WallAnswer volumes;
+  WallSolution volumes;
   ParticleState state;
 };
 
@@ -39,7 +39,7 @@ Eigen::Matrix3Xd random_steps(Eigen::Index n, double longest, std::uint32_t seed
 TEST(StaleList, OfWhatDidNotMoveMissesNothing) {
   for (std::uint32_t seed = 1; seed <= 20; ++seed) {
     const Problem p(random_fixture(seed));
-    const Staleness s = p.list(0).at(p.look());
+    const Staleness s = p.list(0).at(p.sample());
     EXPECT_EQ(s.fluid.missed + s.wall.missed, 0) << seed;
     EXPECT_EQ(s.fluid.listed, s.fluid.within) << seed;
     EXPECT_EQ(s.wall.listed, s.wall.within) << seed;
@@ -55,7 +55,7 @@ TEST(StaleList, OfFluidThatMovesAsOneMissesNothing) {
   Problem p(f);
   const StaleList list = p.list(0);
   p.state.position.colwise() += Vec3(0.3, -0.2, 1.0);
-  const Staleness s = list.at(p.look());
+  const Staleness s = list.at(p.sample());
   EXPECT_GT(s.fluid.within, 0);
   EXPECT_EQ(s.fluid.missed, 0);
   EXPECT_EQ(s.density.relative_rms, 0);
@@ -69,7 +69,7 @@ TEST(StaleList, CountsWhatAllPairsSay) {
     const StaleList list = p.list(skin);
     const Eigen::Matrix3Xd before = p.state.position;
     p.state.position += random_steps(p.state.size(), 0.3 * H, seed);
-    const Instant now = p.look();
+    const Instant now = p.sample();
     const Staleness s = list.at(now);
     const Separation apart(p.scene.domain);
     std::int64_t within = 0, missed = 0, wall_missed = 0;
@@ -106,7 +106,7 @@ TEST(StaleList, MissesNothingWhileTheBoundHolds) {
     const double H = p.scene.support_radius(), skin = 0.05 * (seed % 5);
     const StaleList list = p.list(skin);
     p.state.position += random_steps(p.state.size(), 0.03 * (seed % 7) * H, seed);
-    const Staleness s = list.at(p.look());
+    const Staleness s = list.at(p.sample());
     const bool safe = s.provably_complete(skin, H);
     bounded += safe;
     missing += s.fluid.missed > 0;
@@ -146,7 +146,7 @@ TEST_P(DeficitGrowth, HasThePowersOfTheKernelsEdge) {
   for (int k = 0; k < 2; ++k) {
     p.state.position = start + (k ? large : small) * H * direction;
     for (double& x : p.state.position.reshaped()) x -= 0.2 * std::floor(x / 0.2);
-    s[static_cast<std::size_t>(k)] = list.at(p.look());
+    s[static_cast<std::size_t>(k)] = list.at(p.sample());
   }
   const auto power = [&](double a, double b) { return std::log(b / a) / std::log(large / small); };
   const auto missed = [](const Staleness& x) { return static_cast<double>(x.fluid.missed); };
@@ -174,7 +174,7 @@ TEST_P(DeficitGrowth, HasThosePowersWithinTheFitsOwnConfidence) {
     const StaleList list = p.list(0);
     p.state.position += moved * H * random_steps(p.state.size(), 1, seed);
     for (double& x : p.state.position.reshaped()) x -= 0.2 * std::floor(x / 0.2);
-    const Staleness s = list.at(p.look());
+    const Staleness s = list.at(p.sample());
     points[0].emplace_back(moved, static_cast<double>(s.fluid.missed));
     points[1].emplace_back(moved, s.density.mean);
     points[2].emplace_back(moved, s.acceleration.mean);
@@ -195,7 +195,7 @@ TEST_P(DeficitGrowth, IsWhatTheoryExpectsFromSpeedsAlone) {
   Problem p = gas(GetParam());
   const double H = p.scene.support_radius();
   p.state.velocity = random_steps(p.state.size(), 1, 3);
-  const Instant start = p.look();
+  const Instant start = p.sample();
   const PairsNearEdge near = pairs_near_edge(p.scene, p.volumes.volume, start);
   EXPECT_NEAR(near.neighbors, 8000 / 0.008 * 4 / 3 * M_PI * H * H * H, 0.5);
   for (const double skin : {0.0, 0.03}) {
@@ -203,7 +203,7 @@ TEST_P(DeficitGrowth, IsWhatTheoryExpectsFromSpeedsAlone) {
     const double seconds = 0.1 * H;
     p.state.position = start.state.position + seconds * start.state.velocity;
     for (double& x : p.state.position.reshaped()) x -= 0.2 * std::floor(x / 0.2);
-    const Staleness s = list.at(p.look());
+    const Staleness s = list.at(p.sample());
     const ExpectedDrift expected = expected_drift(p.scene, near, seconds, skin);
     const double missed = static_cast<double>(s.fluid.missed) / static_cast<double>(s.fluid.within);
     EXPECT_NEAR(expected.missed_share / missed, 1, 0.1) << skin;
@@ -216,7 +216,7 @@ TEST_P(DeficitGrowth, IsWhatTheoryExpectsFromSpeedsAlone) {
 TEST(ListTheory, FindsTheSkinThatKeepsATolerance) {
   std::srand(2);
   Problem p = gas(KernelFamily::cubic_spline);
-  const PairsNearEdge near = pairs_near_edge(p.scene, p.volumes.volume, p.look());
+  const PairsNearEdge near = pairs_near_edge(p.scene, p.volumes.volume, p.sample());
   const double seconds = 0.2 * p.scene.support_radius();
   double before = 1;
   for (const double tolerance : {1e-5, 1e-4, 1e-3, 1e-2}) {
@@ -258,7 +258,7 @@ TEST(StaleList, OfAWallThatTurnedShowsInTheWallsTermsAlone) {
   p.state.substep = 0;
   const StaleList list = p.list(0);
   p.state.substep = std::llround(0.05 / p.scene.time_step());
-  const Staleness s = list.at(p.look());
+  const Staleness s = list.at(p.sample());
   EXPECT_EQ(s.farthest, 0);
   EXPECT_GT(s.wall_farthest, 0);
   EXPECT_EQ(s.fluid.missed, 0);

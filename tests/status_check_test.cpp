@@ -44,11 +44,11 @@ class Reporter : public Backend {
 /// Fields of the rows that fail.
 std::set<std::string> failing(const Scene& scene, Reporter::Edit edit) {
   Reporter backend(std::move(edit));
-  Sheet sheet(backend.info(), "status");
-  judge_status(backend, scene, 17, sheet);
+  RowBuilder builder(backend.info(), "status");
+  check_status(backend, scene, 17, builder);
   std::set<std::string> fields;
-  for (const CheckRow& row : sheet.take())
-    if (judged_verdict(row) != Verdict::pass) fields.insert(row.field);
+  for (const CheckRow& row : builder.take())
+    if (verdict_of(row) != Verdict::pass) fields.insert(row.field);
   return fields;
 }
 

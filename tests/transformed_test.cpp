@@ -15,15 +15,15 @@ namespace {
 
 TEST(Transformed, ProblemsHaveTheAnswersOfTheProblem) {
   const Fixture f = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-splash.h5");
-  const OracleAnswer own = answer(f.scene, sample_walls(f.scene), f.state);
+  const ReferenceSolution own = reference_solution(f.scene, sample_walls(f.scene), f.state);
   const auto problems = transformed_problems(f.scene, f.state);
   ASSERT_EQ(problems.size(), 3u);
   for (const TransformedProblem& p : problems) {
     const Walls walls = sample_walls(p.scene);
     ASSERT_EQ(walls.size(), sample_walls(f.scene).size()) << p.name;
-    const OracleAnswer its = answer(p.scene, walls, p.state);
+    const ReferenceSolution its = reference_solution(p.scene, walls, p.state);
     // Rounded to fp32 elsewhere, particles are elsewhere; walls sampled in a turned frame too.
-    const double allowed = p.name == "permuted" ? 1e-12 : p.name == "moved" ? 1e-3 : 0.02;
+    const double allowed = p.name == "permuted" ? 1e-12 : p.name == "translated" ? 1e-3 : 0.02;
     EXPECT_NEAR(its.fields.density.sum() / own.fields.density.sum(), 1, allowed) << p.name;
     const double before = own.fields.acceleration.norm();
     EXPECT_NEAR(its.fields.acceleration.norm() / before, 1, 10 * allowed) << p.name;
@@ -65,10 +65,10 @@ TEST(Checks, AreChosenByName) {
 
 TEST(Checks, AreMadeWhereTheyAreChosenAndNowhereElse) {
   const Fixture f = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-rest.h5");
-  const Judgement oracle = prepare(f, {"conservation"});
+  const PreparedReference oracle = prepare_reference(f, {"conservation"});
   EXPECT_TRUE(oracle.transformed.empty());
   const auto backend = make_backend("hash", Executor::host, "");
-  for (const CheckRow& row : judge(*backend, f, oracle, {"conservation"})) EXPECT_EQ(row.check, "conservation");
+  for (const CheckRow& row : run_checks(*backend, f, oracle, {"conservation"})) EXPECT_EQ(row.check, "conservation");
 }
 
 }  // namespace

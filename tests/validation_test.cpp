@@ -44,9 +44,9 @@ struct Staged {
     fields.fluid_neighbor_count.setConstant(30);
   }
 
-  void look(double time) {
+  void sample(double time) {
     state.substep = std::llround(time / scene.time_step());
-    observer->look({time, state, fields});
+    observer->sample({time, state, fields});
   }
 
   ValidationResult finish() {
@@ -157,8 +157,8 @@ TEST_P(StillWaterPressure, IsJudgedByItsProfile) {
   Staged run("still-tank", 20);
   run.fields.pressure = 1000 * 9.81 * (0.1 - run.state.position.row(2).transpose().array());
   run.fields.pressure *= GetParam();
-  run.look(0);
-  run.look(0.9);
+  run.sample(0);
+  run.sample(0.9);
   const auto result = run.finish();
   EXPECT_EQ(result.passed(), GetParam() == 1.0);
   EXPECT_NEAR(quantity(result, "level").error, 0, 1e-6);
@@ -173,7 +173,7 @@ TEST(Validation, StillWaterWithANaNFails) {
   Eigen::Index inside = 0;
   (run.state.position.colwise() - middle).colwise().norm().minCoeff(&inside);
   run.fields.pressure[inside] = NAN;
-  run.look(0.9);
+  run.sample(0.9);
   EXPECT_FALSE(run.finish().passed());
 }
 
@@ -187,7 +187,7 @@ TEST(Validation, ChannelFlowIsJudgedByItsProfile) {
           run.state.velocity(0, i) = factor * (name[0] == 'c' ? couette_velocity(0.05, 2e-4, 0.02, z, t)
                                                               : poiseuille_velocity(0.2, 2e-4, 0.02, z, t));
         }
-        run.look(t);
+        run.sample(t);
       }
       const auto result = run.finish();
       EXPECT_EQ(result.passed(), factor == 1.0) << name;
@@ -203,7 +203,7 @@ TEST(Validation, DropIsJudgedByItsAxes) {
       const double t = 0.0002 * k, b = k ? factor * drop_axis(100, t) : 1;
       run.state.position.row(0) = start.row(0) / b;
       run.state.position.row(2) = start.row(2) * b;
-      run.look(t);
+      run.sample(t);
     }
     const auto result = run.finish();
     EXPECT_EQ(result.passed(), factor == 1.0);
@@ -223,7 +223,7 @@ TEST(Validation, DamFrontIsJudgedAgainstTheTable) {
       run.state.position(0, 0) = 0.05715 * factor * Z - 0.5 * run.scene.particle_spacing;
       run.state.position(0, 1) = 0.4;
       run.fields.fluid_neighbor_count[1] = 2;
-      run.look(t);
+      run.sample(t);
     }
     const auto result = run.finish();
     EXPECT_EQ(result.passed(), factor == 1.0);
@@ -279,7 +279,7 @@ TEST(Validation, SlitIsJudgedByItsDischarge) {
           static_cast<Eigen::Index>(std::lround(root * root / 0.2 * static_cast<double>(run.state.size())));
       run.state.position = start;
       run.state.position.rightCols(run.state.size() - left).row(2).setConstant(0.1);
-      run.look(t);
+      run.sample(t);
     }
     EXPECT_EQ(run.finish().passed(), coefficient == 0.61);
   }
@@ -291,7 +291,7 @@ TEST(Validation, SlowPourIsJudgedByItsResidual) {
     const double each = run.scene.particle_mass() / run.scene.fluid.rest_density;
     const Eigen::Matrix3Xd start = run.state.position;
     const double holds[][3] = {{1.2, 5.2, 15}, {6.2, 14.2, 30}, {15.2, 25.2, 45}, {26.2, 40.2, 60}};
-    run.look(0);
+    run.sample(0);
     for (const auto& [from, to, degrees] : holds) {
       const double volume = factor * cup_residual(0.035, 0.09, degrees * std::numbers::pi / 180);
       const auto inside = std::min<Eigen::Index>(run.state.size(), std::lround(volume / each));
@@ -300,7 +300,7 @@ TEST(Validation, SlowPourIsJudgedByItsResidual) {
       for (Eigen::Index i = 0; i < run.state.size(); ++i)
         run.state.position.col(i) = i < inside ? pose.to_world(first.to_local(start.col(i)))
                                                : Vec3(-0.1 + 1e-6 * static_cast<double>(i), 0, 0.01);
-      for (const double t : {from, to - 0.4, to - 0.2, to, to + 0.01}) run.look(t);
+      for (const double t : {from, to - 0.4, to - 0.2, to, to + 0.01}) run.sample(t);
     }
     const auto result = run.finish();
     for (const char* at : {"residual at 30", "residual at 45", "residual at 60"}) {

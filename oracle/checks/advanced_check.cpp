@@ -46,14 +46,14 @@ View view(Backend& backend, Eigen::Index particles, Eigen::Index walls, std::int
   return v;
 }
 
-void judge_advanced(const std::vector<View>& views, const Fixture& fixture, const Walls& walls,
-                    const WallAnswer& volumes, Sheet& sheet) {
+void check_advanced(const std::vector<View>& views, const Fixture& fixture, const Walls& walls,
+                    const WallSolution& volumes, RowBuilder& builder) {
   for (const View& v : views) {
     if (const std::string why = objection(v.state, fixture, fixture.state.substep + v.substeps); !why.empty())
-      return sheet.failed("advanced", why);
-    if (!v.status.ok()) return sheet.failed("advanced", describe(v.status));
-    judge_fields("advanced", fmt::format(" after {}", v.substeps), v.fields,
-                 answer(fixture.scene, walls, volumes, v.state), sheet);
+      return builder.failed("advanced", why);
+    if (!v.status.ok()) return builder.failed("advanced", describe(v.status));
+    check_fields("advanced", fmt::format(" after {}", v.substeps), v.fields,
+                 reference_solution(fixture.scene, walls, volumes, v.state), builder);
   }
 }
 

@@ -22,7 +22,7 @@ struct View {
 
 /// Substeps after which a run is viewed: on small fixtures often, at odd and growing distances, so that
 /// some views are just after a list was made and some just before it is made anew, which a backend may do
-/// whenever it is interrupted: the longest stretch is half of a run. None after `substeps`.
+/// whenever it is interrupted: the longest segment is half of a run. None after `substeps`.
 std::vector<int> viewed_after(Eigen::Index particles, std::int64_t substeps);
 
 /// Reads the state, then evaluates.
@@ -30,7 +30,7 @@ View view(Backend& backend, Eigen::Index particles, Eigen::Index walls, std::int
 
 /// Rows of neighbor facts, density, pressure and accelerations for each view, "density after 7": the fields
 /// are held to the oracle's answer at the state that was read.
-void judge_advanced(const std::vector<View>& views, const Fixture& fixture, const Walls& walls,
-                    const WallAnswer& volumes, Sheet& sheet);
+void check_advanced(const std::vector<View>& views, const Fixture& fixture, const Walls& walls,
+                    const WallSolution& volumes, RowBuilder& builder);
 
 }  // namespace decant

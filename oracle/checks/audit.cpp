@@ -1,6 +1,6 @@
 /// \file
 /// Places by cavity and height, penetration by signed distance, crossings by following the straight
-/// path between two looks in the container's frame.
+/// path between two samples in the container's frame.
 ///
 /// A path counts as a crossing where it runs deeper than a quarter of the wall: the chord of a path
 /// that bends around a rim cuts the corner, but far less deep than that between two frames; a path
@@ -37,19 +37,19 @@ bool outside(const Domain& domain, const Vec3& x) {
 
 Audit::Audit(const Scene& scene) : scene_(scene), solids_(scene.containers.begin(), scene.containers.end()) {}
 
-AuditResult Audit::look(const ParticleState& state) {
+AuditResult Audit::sample(const ParticleState& state) {
   AuditResult result;
   const auto n = state.size();
   const double mass = scene_.particle_mass(), time = scene_.time_at(state.substep);
   const Separation separation(scene_.domain);
-  result.place.assign(static_cast<std::size_t>(n), static_cast<std::uint8_t>(Place::in_flight));
+  result.region.assign(static_cast<std::size_t>(n), static_cast<std::uint8_t>(Region::in_flight));
 
   for (Eigen::Index i = 0; i < n; ++i) {
     const Vec3 x = state.position.col(i), v = state.velocity.col(i);
-    auto& place = result.place[static_cast<std::size_t>(i)];
+    auto& place = result.region[static_cast<std::size_t>(i)];
     if (scene_.floor && x.z() - scene_.floor->height < scene_.support_radius())
-      place = static_cast<std::uint8_t>(Place::spilled);
-    if (outside(scene_.domain, x) || !v.allFinite()) place = static_cast<std::uint8_t>(Place::lost);
+      place = static_cast<std::uint8_t>(Region::spilled);
+    if (outside(scene_.domain, x) || !v.allFinite()) place = static_cast<std::uint8_t>(Region::lost);
     result.kinetic_energy += 0.5 * mass * v.squaredNorm();
     result.potential_energy -= mass * scene_.gravity.dot(x);
     // NaN once seen stays.
@@ -62,14 +62,14 @@ AuditResult Audit::look(const ParticleState& state) {
     const Container& container = scene_.containers[c];
     const bool is_source = moves(container) && !source_seen;
     source_seen = source_seen || is_source;
-    const auto cavity = static_cast<std::uint8_t>(is_source ? Place::source : Place::receiver);
+    const auto cavity = static_cast<std::uint8_t>(is_source ? Region::source : Region::receiver);
     const Pose pose = pose_at(container, time);
     const Pose pose_before = pose_at(container, scene_.time_at(last_substep_));
     for (Eigen::Index i = 0; i < n; ++i) {
       const auto k = static_cast<std::size_t>(i);
-      if (result.place[k] == static_cast<std::uint8_t>(Place::lost)) continue;
+      if (result.region[k] == static_cast<std::uint8_t>(Region::lost)) continue;
       const Vec3 x = state.position.col(i), local = pose.to_local(x);
-      if (solids_[c].in_cavity(local)) result.place[k] = cavity;
+      if (solids_[c].in_cavity(local)) result.region[k] = cavity;
       const double distance = solids_[c].at(local).distance;
       if (distance < 0) inside[k] = true;
       if (-distance > result.deepest) {
@@ -84,13 +84,13 @@ AuditResult Audit::look(const ParticleState& state) {
         crossed[k] = true;
     }
   }
-  for (std::size_t k = 0; k < result.place.size(); ++k) {
-    ++result.particles_at[result.place[k]];
+  for (std::size_t k = 0; k < result.region.size(); ++k) {
+    ++result.particles_at[result.region[k]];
     result.inside += inside[k];
     result.crossed += crossed[k];
     if (crossed[k] && result.first_crossed < 0) result.first_crossed = static_cast<std::int64_t>(k);
   }
-  for (std::size_t p = 0; p < place_names.size(); ++p)
+  for (std::size_t p = 0; p < region_names.size(); ++p)
     result.mass_at[p] = mass * static_cast<double>(result.particles_at[p]);
   last_ = state.position;
   last_substep_ = state.substep;

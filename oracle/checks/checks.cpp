@@ -83,7 +83,7 @@ const std::vector<CheckDescription>& check_descriptions() {
        "That answer's own tolerances; moved states are rounded to fp32 first, for both sides.",
        "What is wrong in the same way everywhere."},
       {"status",
-       "Trouble that is made on purpose, in the scene's domain, with few particles and no walls: one leaves "
+       "Errors that are made on purpose, in the scene's domain, with few particles and no walls: one leaves "
        "through each face of each free axis, two at once, one after the other; positions and velocities "
        "that are no number or infinite, in each component. And none where there is none.",
        "Exact: each report has the right kind, particle and substep, and no other kind. A backend may refuse "

@@ -1,5 +1,5 @@
 /// \file
-/// One field of a backend against the oracle's, value by value, and the rows a judgement is made of.
+/// One field of a backend against the oracle's, value by value, and the rows that checks are made of.
 /// Every comparison is written so that NaN fails.
 #pragma once
 
@@ -19,8 +19,8 @@ double score_of(double error, double tolerance);
 
 /// Values of one field, particle by particle, `components` a particle.
 struct Values {
-  Eigen::VectorXd got, expected, tolerance;
-  Eigen::VectorXd float_value;  // empty: no fp32 counterpart
+  Eigen::VectorXd actual, expected, tolerance;
+  Eigen::VectorXd fp32_value;  // empty: no fp32 counterpart
   int components = 1;
   const std::vector<bool>* excluded = nullptr;
   std::int64_t most_excluded = 0;
@@ -43,9 +43,9 @@ void compare(const Values& v, CheckRow& row);
 void compare(double error, double tolerance, CheckRow& row, std::int64_t worst_id = -1);
 
 /// Rows of one backend on one fixture, in order.
-class Sheet {
+class RowBuilder {
  public:
-  Sheet(const BackendInfo& info, const std::string& fixture);
+  RowBuilder(const BackendInfo& info, const std::string& fixture);
 
   CheckRow& row(const char* check, const std::string& field, const char* unit);
   /// A check of which nothing could be compared.

@@ -5,9 +5,9 @@
 #include "oracle/checks/advanced_check.hpp"
 #include "oracle/checks/comparison.hpp"
 #include "oracle/checks/field_checks.hpp"
+#include "oracle/checks/neighborhood.hpp"
 #include "oracle/checks/run_checks.hpp"
 #include "oracle/checks/status_check.hpp"
-#include "oracle/checks/surroundings.hpp"
 #include "oracle/solution/sum_bound.hpp"
 #include "reference/error.hpp"
 #include "reference/sampling.hpp"
@@ -24,43 +24,43 @@
 namespace decant {
 namespace {
 
-void run_fields(Backend& backend, const Judgement& oracle, Sheet& sheet) {
+void run_fields(Backend& backend, const PreparedReference& oracle, RowBuilder& builder) {
   const auto n = oracle.own.fields.density.size(), m = oracle.own.fields.boundary_volume.size();
   Fields got = Fields::unwritten(n, m);
-  if (const Status status = backend.evaluate(got); !status.ok()) return sheet.failed("evaluation", describe(status));
-  judge_stages(got, all_answered(), oracle, sheet);
+  if (const Status status = backend.evaluate(got); !status.ok()) return builder.failed("evaluation", describe(status));
+  check_stages(got, all_answered(), oracle, builder);
   Fields staged = Fields::unwritten(n, m);
   if (const Status status = backend.evaluate(staged, &oracle.inputs); !status.ok())
-    return sheet.failed("acceleration", describe(status));
-  judge_staged(staged, all_answered(), oracle, sheet);
-  judge_evaluation(got, all_answered(), oracle, sheet);
+    return builder.failed("acceleration", describe(status));
+  check_staged(staged, all_answered(), oracle, builder);
+  check_evaluation(got, all_answered(), oracle, builder);
 }
 
 /// What lists that verify themselves count in the first substep: the pairs of the state that was loaded. A
 /// particle with a pair too near to H may have one more or less, and rarely two.
-void judge_verified(const PairTotals& counted, const OracleAnswer& own, Sheet& sheet) {
+void check_verified(const PairTotals& counted, const ReferenceSolution& own, RowBuilder& builder) {
   if (counted.pairs == 0 && counted.wall_pairs == 0) return;
   const auto row = [&](const char* field, std::int64_t got, const auto& neighbors, const std::vector<bool>& ambiguous) {
     const auto unsure = std::count(ambiguous.begin(), ambiguous.end(), true);
     compare(std::abs(static_cast<double>(got - neighbors.sum())), 2.0 * static_cast<double>(unsure),
-            sheet.row("substep", field, "1"));
+            builder.row("substep", field, "1"));
   };
   row("verified_pairs", counted.pairs, own.fields.fluid_neighbor_count, own.fluid_ambiguous);
   row("verified_wall_pairs", counted.wall_pairs, own.fields.wall_neighbor_count, own.wall_ambiguous);
 }
 
-void run_substep(Backend& backend, const Fixture& fixture, const Judgement& oracle, Sheet& sheet) {
-  if (const Status status = backend.advance(1); !status.ok()) return sheet.failed("substep", describe(status));
+void run_substep(Backend& backend, const Fixture& fixture, const PreparedReference& oracle, RowBuilder& builder) {
+  if (const Status status = backend.advance(1); !status.ok()) return builder.failed("substep", describe(status));
   ParticleState got;
   backend.read(got);
   const auto n = fixture.state.size();
   if (got.position.cols() != n || got.velocity.cols() != n)
-    return sheet.failed(
+    return builder.failed(
         "substep", fmt::format("{} positions and {} velocities, not {}", got.position.cols(), got.velocity.cols(), n));
   if (got.substep != fixture.state.substep + 1)
-    return sheet.failed("substep", fmt::format("is at substep {}, not {}", got.substep, fixture.state.substep + 1));
-  judge_substep(got, all_answered(), fixture, oracle, sheet);
-  judge_verified(backend.neighbor_stats().verified, oracle.own, sheet);
+    return builder.failed("substep", fmt::format("is at substep {}, not {}", got.substep, fixture.state.substep + 1));
+  check_substep(got, all_answered(), fixture, oracle, builder);
+  check_verified(backend.neighbor_stats().verified, oracle.own, builder);
 }
 
 /// Recorded against recomputed, both in double: only the last bits may differ between compilers. Tolerances
@@ -77,7 +77,7 @@ void require_reproduced(const Fixture& fixture, const std::string& name, const E
   }
 }
 
-void require_reproduced(const Fixture& fixture, const OracleAnswer& today) {
+void require_reproduced(const Fixture& fixture, const ReferenceSolution& today) {
   const bool recorded_at_all = fixture.fields || fixture.sample_id.size() > 0;
   if (!recorded_at_all) return;
   if (fixture.fields) {
@@ -111,14 +111,14 @@ void require_reproduced(const Fixture& fixture, const OracleAnswer& today) {
 }  // namespace
 
 std::string evaluate_oracle(const Scene& scene, const ParticleState& state, Fields& fields, ConditionSums& condition) {
-  OracleAnswer a = answer(scene, sample_walls(scene), state);
-  std::string why = weakness(a);
+  ReferenceSolution a = reference_solution(scene, sample_walls(scene), state);
+  std::string why = ill_posed_reason(a);
   fields = std::move(a.fields);
   condition = std::move(a.condition);
   return why;
 }
 
-std::string weakness(const OracleAnswer& a) {
+std::string ill_posed_reason(const ReferenceSolution& a) {
   const auto objection = [](const std::vector<bool>& ambiguous, std::int64_t most, const char* kind) {
     const auto count = std::count(ambiguous.begin(), ambiguous.end(), true);
     return count <= most ? std::string()
@@ -135,15 +135,15 @@ std::string weakness(const OracleAnswer& a) {
 namespace {
 
 /// Where a run of the fixture is interrupted, whatever is asked of it: the same run every time.
-std::vector<Stretch> stretches_of(const Fixture& fixture, int look_every) {
+std::vector<Segment> stretches_of(const Fixture& fixture, int sample_every) {
   const auto substeps = static_cast<int>(fixture.ensemble.substeps);
   const std::vector<int> viewed = viewed_after(fixture.state.size(), substeps);
   std::set<int> ends(viewed.begin(), viewed.end());
-  for (int done = look_every > 0 || viewed.empty() ? 0 : viewed.back(); done < substeps; ends.insert(done)) {
+  for (int done = sample_every > 0 || viewed.empty() ? 0 : viewed.back(); done < substeps; ends.insert(done)) {
     const int left = substeps - done;
-    done += look_every > 0 ? std::min(look_every, left) : (left + 1) / 2;
+    done += sample_every > 0 ? std::min(sample_every, left) : (left + 1) / 2;
   }
-  std::vector<Stretch> all;
+  std::vector<Segment> all;
   int last = 0;
   for (const int end : ends) {
     all.push_back({end - last, std::ranges::find(viewed, end) != viewed.end()});
@@ -152,32 +152,32 @@ std::vector<Stretch> stretches_of(const Fixture& fixture, int look_every) {
   return all;
 }
 
-/// The oracle's own run with the looks that a backend's run gets.
-void run_ahead(const Fixture& fixture, Judgement& j) {
+/// The oracle's own run sampled as a backend's run is.
+void run_ahead(const Fixture& fixture, PreparedReference& j) {
   Solver solver(fixture.scene, j.walls, fixture.state);
   Audit audit(fixture.scene);
-  audit.look(fixture.state);
+  audit.sample(fixture.state);
   std::int64_t done = 0;
-  for (const Stretch& stretch : j.stretches) {
-    for (int k = 0; k < stretch.substeps; ++k) solver.substep();
+  for (const Segment& segment : j.segments) {
+    for (int k = 0; k < segment.substeps; ++k) solver.substep();
     if (4 * done < fixture.ensemble.substeps) ++j.repeated;
-    done += stretch.substeps;
-    j.later_look = audit.look(solver.state());
-    j.deepest = std::max(j.deepest, j.later_look.deepest);
-    j.crossed = std::max(j.crossed, j.later_look.crossed);
+    done += segment.substeps;
+    j.later_sample = audit.sample(solver.state());
+    j.deepest = std::max(j.deepest, j.later_sample.deepest);
+    j.crossed = std::max(j.crossed, j.later_sample.crossed);
   }
   j.later = solver.state();
 }
 
 }  // namespace
 
-Judgement prepare(const Fixture& fixture, const CheckSelection& checks, int look_every) {
+PreparedReference prepare_reference(const Fixture& fixture, const CheckSelection& checks, int sample_every) {
   const Scene& scene = fixture.scene;
-  Judgement j;
+  PreparedReference j;
   j.walls = sample_walls(scene);
-  j.volumes = wall_answer(scene, j.walls);
-  const WallAnswer& volumes = j.volumes;
-  j.own = answer(scene, j.walls, volumes, fixture.state);
+  j.volumes = wall_solution(scene, j.walls);
+  const WallSolution& volumes = j.volumes;
+  j.own = reference_solution(scene, j.walls, volumes, fixture.state);
   require_reproduced(fixture, j.own);
   j.inputs.density = j.own.fields.density.cast<float>().cast<double>();
   j.inputs.pressure = j.own.fields.pressure.cast<float>().cast<double>();
@@ -185,44 +185,44 @@ Judgement prepare(const Fixture& fixture, const CheckSelection& checks, int look
     return std::any_of(names.begin(), names.end(), [&](const char* name) { return checks.count(name) > 0; });
   };
   if (wanted({"fields", "conservation"})) {
-    j.given = answer(scene, j.walls, volumes, fixture.state, &j.inputs);
-    j.given_float = float_fields(scene, j.walls, volumes, fixture.state, &j.inputs);
+    j.given = reference_solution(scene, j.walls, volumes, fixture.state, &j.inputs);
+    j.given_fp32 = fp32_reference_fields(scene, j.walls, volumes, fixture.state, &j.inputs);
   }
-  if (wanted({"fields"})) j.own_float = float_fields(scene, j.walls, volumes, fixture.state);
-  if (wanted({"substep"})) j.substep = substep_answer(scene, fixture.state, j.own);
+  if (wanted({"fields"})) j.own_fp32 = fp32_reference_fields(scene, j.walls, volumes, fixture.state);
+  if (wanted({"substep"})) j.substep = substep_solution(scene, fixture.state, j.own);
   if (wanted({"contact"})) j.contact = contact_problems(scene, fixture.state, j.own.fields.acceleration);
   const bool runs = wanted({"trajectory", "mass", "containment", "determinism"});
-  if (runs || wanted({"advanced"})) j.stretches = stretches_of(fixture, look_every);
+  if (runs || wanted({"advanced"})) j.segments = stretches_of(fixture, sample_every);
   if (runs) run_ahead(fixture, j);
   // Nobody looks beyond the last view.
-  while (!runs && !j.stretches.empty() && !j.stretches.back().viewed) j.stretches.pop_back();
+  while (!runs && !j.segments.empty() && !j.segments.back().viewed) j.segments.pop_back();
   if (!wanted({"advanced"}))
-    for (Stretch& stretch : j.stretches) stretch.viewed = false;
+    for (Segment& segment : j.segments) segment.viewed = false;
   if (wanted({"invariance"}))
     for (TransformedProblem& problem : transformed_problems(scene, fixture.state)) {
       Walls walls = sample_walls(problem.scene);
-      OracleAnswer its_answer = answer(problem.scene, walls, problem.state);
+      ReferenceSolution its_answer = reference_solution(problem.scene, walls, problem.state);
       j.transformed.push_back({std::move(problem), std::move(walls), std::move(its_answer)});
     }
   return j;
 }
 
-std::vector<CheckRow> judge(Backend& backend, const Fixture& fixture, const Judgement& oracle,
-                            const CheckSelection& checks) {
-  std::optional<Sheet> sheet;
+std::vector<CheckRow> run_checks(Backend& backend, const Fixture& fixture, const PreparedReference& oracle,
+                                 const CheckSelection& checks) {
+  std::optional<RowBuilder> builder;
   try {
-    sheet.emplace(backend.info(), fixture.name);
+    builder.emplace(backend.info(), fixture.name);
     backend.load(fixture.scene, oracle.walls, fixture.state);
-    if (checks.count("fields")) run_fields(backend, oracle, *sheet);
-    if (checks.count("substep")) run_substep(backend, fixture, oracle, *sheet);
-    if (checks.count("contact")) judge_contact(backend, oracle.walls, oracle.contact, *sheet);
-    judge_runs(backend, fixture, oracle, checks, *sheet);
-    if (checks.count("status")) judge_status(backend, fixture.scene, fixture.state.substep, *sheet);
+    if (checks.count("fields")) run_fields(backend, oracle, *builder);
+    if (checks.count("substep")) run_substep(backend, fixture, oracle, *builder);
+    if (checks.count("contact")) check_contact(backend, oracle.walls, oracle.contact, *builder);
+    check_runs(backend, fixture, oracle, checks, *builder);
+    if (checks.count("status")) check_status(backend, fixture.scene, fixture.state.substep, *builder);
   } catch (const std::exception& error) {
-    if (!sheet) sheet.emplace(BackendInfo{}, fixture.name);  // it cannot even say what it is
-    sheet->failed("run", error.what());
+    if (!builder) builder.emplace(BackendInfo{}, fixture.name);  // it cannot even say what it is
+    builder->failed("run", error.what());
   }
-  std::vector<CheckRow> rows = sheet->take();
+  std::vector<CheckRow> rows = builder->take();
   locate(fixture, oracle.walls, rows);
   return rows;
 }

@@ -10,7 +10,7 @@
 #include "oracle/report/report.hpp"
 #include "oracle/solution/ensemble.hpp"
 #include "oracle/solution/fixture.hpp"
-#include "oracle/solution/substep_answer.hpp"
+#include "oracle/solution/substep_solution.hpp"
 #include "oracle/solution/tolerance.hpp"
 
 #include <memory>
@@ -20,36 +20,36 @@
 namespace decant {
 
 /// The oracle's answer to the same problem told otherwise.
-struct TransformedAnswer {
+struct TransformedSolution {
   TransformedProblem problem;
   Walls walls;
-  OracleAnswer answer;
+  ReferenceSolution solution;
 };
 
 /// A part of a run, after which its state is read.
-struct Stretch {
+struct Segment {
   int substeps = 0;
   bool viewed = false;  // fields are evaluated too (oracle/checks/advanced_check.hpp)
 };
 
 /// Everything the oracle has to say about one fixture. Made once, used for every backend.
-struct Judgement {
+struct PreparedReference {
   Walls walls;
-  WallAnswer volumes;
-  OracleAnswer own;               // every stage from the stage before
-  StageInputs inputs;             // the oracle's density and pressure, rounded to fp32
-  OracleAnswer given;             // accelerations from those inputs
-  Fields own_float, given_float;  // the same source in sequential fp32
-  SubstepAnswer substep;
+  WallSolution volumes;
+  ReferenceSolution own;        // every stage from the stage before
+  StageInputs inputs;           // the oracle's density and pressure, rounded to fp32
+  ReferenceSolution given;      // accelerations from those inputs
+  Fields own_fp32, given_fp32;  // the same source in sequential fp32
+  SubstepSolution substep;
   std::vector<ContactProblem> contact;
   // The oracle's own run, as long as the fixture's ensemble is, and looked at as backends' runs are.
-  std::vector<Stretch> stretches;
+  std::vector<Segment> segments;
   std::size_t repeated = 0;  // so many of them, a quarter of the run or more, show that it is reproducible
   ParticleState later;
-  AuditResult later_look;
+  AuditResult later_sample;
   double deepest = 0;  // m, inside a wall, at any look
   std::int64_t crossed = 0;
-  std::vector<TransformedAnswer> transformed;
+  std::vector<TransformedSolution> transformed;
 };
 
 /// Fields and condition sums at one state, as a fixture records them. Returns why no backend can
@@ -58,14 +58,15 @@ struct Judgement {
 std::string evaluate_oracle(const Scene& scene, const ParticleState& state, Fields& fields, ConditionSums& condition);
 
 /// Why no backend can pass where this is the answer; empty for a sound one.
-std::string weakness(const OracleAnswer& answer);
+std::string ill_posed_reason(const ReferenceSolution& solution);
 
 /// Evaluates the oracle on the fixture's state, as far as these checks need it. Throws InputError where
 /// the recorded fields, if there are any, are not what this build's reference gives within the tolerances scaled from 2⁻²⁴
 /// to 2⁻⁵³.
-/// \param look_every  substeps between two looks at a run, for containment and mass; 0: where it is viewed,
+/// \param sample_every  substeps between two samples of a run, for containment and mass; 0: where it is viewed,
 ///                    after half of the rest, and so on
-Judgement prepare(const Fixture& fixture, const CheckSelection& checks = all_checks(), int look_every = 0);
+PreparedReference prepare_reference(const Fixture& fixture, const CheckSelection& checks = all_checks(),
+                                    int sample_every = 0);
 
 /// Loads the fixture into the backend and compares; a backend that throws or reports trouble gives
 /// rows with verdict fail and the reason. Rows of the check `fields` carry the stage's name:
@@ -73,7 +74,7 @@ Judgement prepare(const Fixture& fixture, const CheckSelection& checks = all_che
 ///   equation_of_state, acceleration   from the oracle's density, and pressure
 ///   evaluation                        from the backend's own
 /// \param oracle  prepared for these checks at least
-std::vector<CheckRow> judge(Backend& backend, const Fixture& fixture, const Judgement& oracle,
-                            const CheckSelection& checks = all_checks());
+std::vector<CheckRow> run_checks(Backend& backend, const Fixture& fixture, const PreparedReference& oracle,
+                                 const CheckSelection& checks = all_checks());
 
 }  // namespace decant

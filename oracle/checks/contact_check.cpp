@@ -257,11 +257,11 @@ double fastest_wall(const Scene& scene, std::int64_t substep) {
 
 /// The substep at which walls move fastest.
 std::int64_t fastest_substep(const Scene& scene, std::int64_t own) {
-  constexpr int looks = 256;
+  constexpr int samples = 256;
   const auto all = static_cast<std::int64_t>(scene.schedule.frames) * scene.schedule.substeps_per_frame;
   std::int64_t best = own;
-  for (int k = 0; k < looks; ++k) {
-    const std::int64_t at = all * k / looks;
+  for (int k = 0; k < samples; ++k) {
+    const std::int64_t at = all * k / samples;
     if (fastest_wall(scene, at) > 1.001 * fastest_wall(scene, best)) best = at;
   }
   return best;
@@ -282,10 +282,10 @@ void append(Compared& all, const Scene& scene, const ParticleState& read,
             const std::vector<std::vector<SubstepOutcome>>& outcomes) {
   const ParticleState got = nearest_images(read, scene, outcomes);
   const NearestOutcomes nearest = nearest_outcomes(outcomes, got);
-  append(all.position.got, got.position);
+  append(all.position.actual, got.position);
   append(all.position.expected, nearest.position);
   append(all.position.tolerance, nearest.position_tolerance);
-  append(all.velocity.got, got.velocity);
+  append(all.velocity.actual, got.velocity);
   append(all.velocity.expected, nearest.velocity);
   append(all.velocity.tolerance, nearest.velocity_tolerance);
 }
@@ -315,20 +315,21 @@ std::vector<ContactProblem> contact_problems(const Scene& scene, const ParticleS
   return problems;
 }
 
-void judge_contact(Backend& backend, const Walls& walls, const std::vector<ContactProblem>& problems, Sheet& sheet) {
+void check_contact(Backend& backend, const Walls& walls, const std::vector<ContactProblem>& problems,
+                   RowBuilder& builder) {
   Compared first, later;
   for (auto* values : {&first.position, &first.velocity, &later.position, &later.velocity}) values->components = 3;
   for (const ContactProblem& problem : problems) {
     const auto n = problem.state.size();
     const auto advance = [&](int substeps, ParticleState& state) {
       if (const Status status = backend.advance(substeps); !status.ok()) {
-        sheet.failed("contact", describe(status));
+        builder.failed("contact", describe(status));
         return false;
       }
       backend.read(state);
       if (state.position.cols() == n && state.velocity.cols() == n) return true;
-      sheet.failed("contact", fmt::format("{} positions and {} velocities, not {}", state.position.cols(),
-                                          state.velocity.cols(), n));
+      builder.failed("contact", fmt::format("{} positions and {} velocities, not {}", state.position.cols(),
+                                            state.velocity.cols(), n));
       return false;
     };
     backend.load(problem.scene, walls, problem.state);
@@ -342,7 +343,7 @@ void judge_contact(Backend& backend, const Walls& walls, const std::vector<Conta
     append(later, problem.scene, told, problem.later);
   }
   const auto row = [&](const std::string& field, const char* unit, const Values& values, bool after_the_run) {
-    CheckRow& r = sheet.row("contact", field, unit);
+    CheckRow& r = builder.row("contact", field, unit);
     compare(values, r);
     if (r.verdict != Verdict::fail || r.worst_id < 0) return;
     // Ids are those of probes, and of nobody in the fixture.

@@ -6,7 +6,7 @@
 #include "oracle/backend.hpp"
 #include "oracle/checks/comparison.hpp"
 #include "oracle/solution/fixture.hpp"
-#include "oracle/solution/substep_answer.hpp"
+#include "oracle/solution/substep_solution.hpp"
 
 #include <string>
 #include <vector>
@@ -38,6 +38,7 @@ std::vector<ContactProblem> contact_problems(const Scene& scene, const ParticleS
                                              const Eigen::Matrix3Xd& acceleration);
 
 /// Rows position and velocity, one substep on and after the run.
-void judge_contact(Backend& backend, const Walls& walls, const std::vector<ContactProblem>& problems, Sheet& sheet);
+void check_contact(Backend& backend, const Walls& walls, const std::vector<ContactProblem>& problems,
+                   RowBuilder& builder);
 
 }  // namespace decant

@@ -12,20 +12,20 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// Compares where the field was answered, else leaves a row that did not run.
-void judge_field(const char* check, const char* name, const char* unit, const Answered& answered, const Values& values,
-                 Sheet& sheet) {
-  CheckRow& row = sheet.row(check, name, unit);
+void check_field(const char* check, const char* name, const char* unit, const Answered& answered, const Values& values,
+                 RowBuilder& builder) {
+  CheckRow& row = builder.row(check, name, unit);
   if (answered.count(name)) compare(values, row);
   else row.reason = not_given;
 }
 
-void judge_accelerations(const char* check, const Fields& got, const Answered& answered, const OracleAnswer& oracle,
-                         const Fields& in_float, Sheet& sheet) {
+void check_accelerations(const char* check, const Fields& got, const Answered& answered,
+                         const ReferenceSolution& oracle, const Fields& in_float, RowBuilder& builder) {
   for (const auto& field : acceleration_fields)
-    judge_field(check, field.name, "m/s^2", answered,
+    check_field(check, field.name, "m/s^2", answered,
                 {flat(got.*field.member), flat(oracle.fields.*field.member), flat(oracle.tolerance.*field.member),
                  flat(in_float.*field.member), 3, nullptr, 0},
-                sheet);
+                builder);
 }
 
 /// The outcome that position and velocity together are nearest to, by score.
@@ -92,11 +92,11 @@ const Answered& all_answered() {
   return all;
 }
 
-void judge_stages(const Fields& got, const Answered& answered, const Judgement& oracle, Sheet& sheet) {
-  const OracleAnswer& own = oracle.own;
+void check_stages(const Fields& got, const Answered& answered, const PreparedReference& oracle, RowBuilder& builder) {
+  const ReferenceSolution& own = oracle.own;
   for (const NeighborFact& fact : neighbor_facts) {
     const Eigen::VectorXd expected = flat(own.fields.*fact.member);
-    judge_field("neighbors", fact.name, "1", answered,
+    check_field("neighbors", fact.name, "1", answered,
                 {flat(got.*fact.member),
                  expected,
                  Eigen::VectorXd::Zero(expected.size()),
@@ -105,63 +105,64 @@ void judge_stages(const Fields& got, const Answered& answered, const Judgement& 
                  fact.of_walls ? &own.wall_ambiguous : &own.fluid_ambiguous,
                  fact.of_walls ? own.most_wall_ambiguous : own.most_fluid_ambiguous,
                  0.0},
-                sheet);
+                builder);
   }
   for (const StageField& field : stage_fields)
-    judge_field(field.name, field.name, field.unit, answered,
+    check_field(field.name, field.name, field.unit, answered,
                 {got.*field.member, own.fields.*field.member, own.tolerance.*field.member,
-                 oracle.own_float.*field.member, 1, nullptr, 0},
-                sheet);
+                 oracle.own_fp32.*field.member, 1, nullptr, 0},
+                builder);
 }
 
-void judge_staged(const Fields& got, const Answered& answered, const Judgement& oracle, Sheet& sheet) {
-  judge_field("equation_of_state", "pressure", "Pa", answered,
-              {got.pressure, oracle.given.fields.pressure, oracle.given.tolerance.pressure, oracle.given_float.pressure,
+void check_staged(const Fields& got, const Answered& answered, const PreparedReference& oracle, RowBuilder& builder) {
+  check_field("equation_of_state", "pressure", "Pa", answered,
+              {got.pressure, oracle.given.fields.pressure, oracle.given.tolerance.pressure, oracle.given_fp32.pressure,
                1, nullptr, 0},
-              sheet);
-  judge_accelerations("acceleration", got, answered, oracle.given, oracle.given_float, sheet);
+              builder);
+  check_accelerations("acceleration", got, answered, oracle.given, oracle.given_fp32, builder);
 }
 
-void judge_evaluation(const Fields& got, const Answered& answered, const Judgement& oracle, Sheet& sheet) {
-  judge_accelerations("evaluation", got, answered, oracle.own, oracle.own_float, sheet);
+void check_evaluation(const Fields& got, const Answered& answered, const PreparedReference& oracle,
+                      RowBuilder& builder) {
+  check_accelerations("evaluation", got, answered, oracle.own, oracle.own_fp32, builder);
 }
 
-void judge_substep(const ParticleState& answer_of_backend, const Answered& answered, const Fixture& fixture,
-                   const Judgement& oracle, Sheet& sheet) {
-  const SubstepAnswer& answer = oracle.substep;
-  const ParticleState got = nearest_images(answer_of_backend, fixture.scene, answer.outcomes);
-  const NearestOutcomes nearest = nearest_outcomes(answer.outcomes, got);
+void check_substep(const ParticleState& answer_of_backend, const Answered& answered, const Fixture& fixture,
+                   const PreparedReference& oracle, RowBuilder& builder) {
+  const SubstepSolution& solution = oracle.substep;
+  const ParticleState got = nearest_images(answer_of_backend, fixture.scene, solution.outcomes);
+  const NearestOutcomes nearest = nearest_outcomes(solution.outcomes, got);
   // An undecidable push is no longer than a particle spacing, or than what pushes back from deep inside
   // a wall: one projection the one way, and two as long the other way; and no faster than sound.
-  const double apart = std::max(fixture.scene.particle_spacing, 3 * answer.longest_push);
-  judge_field("substep", "position", "m", answered,
+  const double apart = std::max(fixture.scene.particle_spacing, 3 * solution.longest_push);
+  check_field("substep", "position", "m", answered,
               {flat(got.position),
                flat(nearest.position),
                flat(nearest.position_tolerance),
                {},
                3,
-               &answer.ambiguous,
-               answer.most_ambiguous,
+               &solution.ambiguous,
+               solution.most_ambiguous,
                -infinity,
                apart},
-              sheet);
-  judge_field("substep", "velocity", "m/s", answered,
+              builder);
+  check_field("substep", "velocity", "m/s", answered,
               {flat(got.velocity),
                flat(nearest.velocity),
                flat(nearest.velocity_tolerance),
                {},
                3,
-               &answer.ambiguous,
-               answer.most_ambiguous,
+               &solution.ambiguous,
+               solution.most_ambiguous,
                -infinity,
                fixture.scene.fluid.sound_speed},
-              sheet);
+              builder);
 }
 
-void judge_fields(const char* check, const std::string& after, const Fields& got, const OracleAnswer& oracle,
-                  Sheet& sheet) {
+void check_fields(const char* check, const std::string& after, const Fields& got, const ReferenceSolution& oracle,
+                  RowBuilder& builder) {
   const auto row = [&](const char* field, const char* unit) -> CheckRow& {
-    return sheet.row(check, field + after, unit);
+    return builder.row(check, field + after, unit);
   };
   for (const NeighborFact& fact : neighbor_facts) {
     const Eigen::VectorXd expected = flat(oracle.fields.*fact.member);
@@ -183,20 +184,20 @@ void judge_fields(const char* check, const std::string& after, const Fields& got
             row(field.name, "m/s^2"));
 }
 
-void judge_momentum(const Fields& got, const Answered& answered, const Fixture& fixture, const Judgement& oracle,
-                    Sheet& sheet) {
+void check_momentum(const Fields& got, const Answered& answered, const Fixture& fixture,
+                    const PreparedReference& oracle, RowBuilder& builder) {
   const double mass = fixture.scene.particle_mass();
   const auto momentum = [&](const char* name, const char* part, Eigen::Matrix3Xd Fields::* field) {
-    CheckRow& row = sheet.row("conservation", name, "N");
+    CheckRow& row = builder.row("conservation", name, "N");
     if (!answered.count(part)) {
       row.reason = not_given;
       return;
     }
     Values v;
-    v.got = mass * (got.*field).rowwise().sum();
+    v.actual = mass * (got.*field).rowwise().sum();
     v.expected = mass * (oracle.given.fields.*field).rowwise().sum();
     v.tolerance = mass * (oracle.given.tolerance.*field).rowwise().norm();
-    v.float_value = mass * (oracle.given_float.*field).rowwise().sum();
+    v.fp32_value = mass * (oracle.given_fp32.*field).rowwise().sum();
     v.components = 3;
     compare(v, row);
     row.worst_id = -1;

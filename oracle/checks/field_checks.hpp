@@ -58,13 +58,14 @@ const Answered& all_answered();
 inline constexpr const char* not_given = "not given";
 
 /// Rows `neighbors`, `boundary_volume`, `density`, `pressure`, each from the stage before.
-void judge_stages(const Fields& got, const Answered& answered, const Judgement& oracle, Sheet& sheet);
+void check_stages(const Fields& got, const Answered& answered, const PreparedReference& oracle, RowBuilder& builder);
 
 /// Rows `equation_of_state`, `acceleration`: from the oracle's own density and pressure.
-void judge_staged(const Fields& got, const Answered& answered, const Judgement& oracle, Sheet& sheet);
+void check_staged(const Fields& got, const Answered& answered, const PreparedReference& oracle, RowBuilder& builder);
 
 /// Row `evaluation`: accelerations from one's own density and pressure.
-void judge_evaluation(const Fields& got, const Answered& answered, const Judgement& oracle, Sheet& sheet);
+void check_evaluation(const Fields& got, const Answered& answered, const PreparedReference& oracle,
+                      RowBuilder& builder);
 
 /// What particles may be, each in the outcome that position and velocity together are nearest to, by score.
 struct NearestOutcomes {
@@ -82,16 +83,16 @@ ParticleState nearest_images(ParticleState got, const Scene& scene,
 /// Row `substep`. Position and velocity, as far as answered, are held together to the outcome that
 /// they are nearest to.
 /// \param got  one substep after the fixture's state, in id order
-void judge_substep(const ParticleState& got, const Answered& answered, const Fixture& fixture, const Judgement& oracle,
-                   Sheet& sheet);
+void check_substep(const ParticleState& got, const Answered& answered, const Fixture& fixture,
+                   const PreparedReference& oracle, RowBuilder& builder);
 
 /// Rows of neighbor facts, density, pressure and accelerations against the oracle's answer at the same
 /// state. \param after  follows each field's name, as in "density after 3"
-void judge_fields(const char* check, const std::string& after, const Fields& got, const OracleAnswer& oracle,
-                  Sheet& sheet);
+void check_fields(const char* check, const std::string& after, const Fields& got, const ReferenceSolution& oracle,
+                  RowBuilder& builder);
 
-/// Row `conservation`: what the parts of `judge_staged` that act between fluid particles add up to.
-void judge_momentum(const Fields& got, const Answered& answered, const Fixture& fixture, const Judgement& oracle,
-                    Sheet& sheet);
+/// Row `conservation`: what the parts of `check_staged` that act between fluid particles add up to.
+void check_momentum(const Fields& got, const Answered& answered, const Fixture& fixture,
+                    const PreparedReference& oracle, RowBuilder& builder);
 
 }  // namespace decant

@@ -20,33 +20,33 @@ namespace {
 /// What a run left behind.
 struct Run {
   Status status;
-  ParticleState early, end;  // after the oracle's `repeated` stretches, after all
+  ParticleState early, end;  // after the oracle's `repeated` segments, after all
   NeighborStats counted;     // then
-  std::vector<AuditResult> looks;
+  std::vector<AuditResult> samples;
   std::vector<View> views;
 };
 
-/// A run of the oracle's first `count` stretches.
-Run run(Backend& backend, const Fixture& fixture, const Judgement& oracle, std::size_t count) {
+/// A run of the oracle's first `count` segments.
+Run run(Backend& backend, const Fixture& fixture, const PreparedReference& oracle, std::size_t count) {
   const ParticleState& start = fixture.state;
   Run r;
   backend.load(fixture.scene, oracle.walls, start);
   Audit audit(fixture.scene);
-  audit.look(start);
+  audit.sample(start);
   std::int64_t done = 0;
   for (std::size_t k = 0; k < count; ++k) {
-    const Stretch& stretch = oracle.stretches[k];
-    r.status = backend.advance(stretch.substeps);
+    const Segment& segment = oracle.segments[k];
+    r.status = backend.advance(segment.substeps);
     if (!r.status.ok()) return r;
-    done += stretch.substeps;
+    done += segment.substeps;
     backend.read(r.end);
     if (r.end.position.cols() != start.size() || r.end.velocity.cols() != start.size()) return r;
     if (k + 1 == oracle.repeated) {
       r.early = r.end;
       r.counted = backend.neighbor_stats();
     }
-    r.looks.push_back(audit.look(r.end));
-    if (stretch.viewed) r.views.push_back(view(backend, start.size(), oracle.walls.size(), done));
+    r.samples.push_back(audit.sample(r.end));
+    if (segment.viewed) r.views.push_back(view(backend, start.size(), oracle.walls.size(), done));
   }
   return r;
 }
@@ -61,11 +61,11 @@ std::int64_t differing(const Eigen::Ref<const Eigen::MatrixXd>& a, const Eigen::
   return count;
 }
 
-void judge_trajectory(const Run& r, const Fixture& fixture, const Judgement& oracle, Sheet& sheet) {
+void check_trajectory(const Run& r, const Fixture& fixture, const PreparedReference& oracle, RowBuilder& builder) {
   const Divergence apart = divergence(fixture.scene, r.end, oracle.later);
   const Divergence bound = divergence_bound(fixture.ensemble);
   for (std::size_t k = 0; k < apart.size(); ++k) {
-    CheckRow& row = sheet.row("trajectory", divergence_names[k], divergence_units[k]);
+    CheckRow& row = builder.row("trajectory", divergence_names[k], divergence_units[k]);
     compare(apart[k], bound[k], row);
     if (row.verdict == Verdict::fail)
       row.reason = fmt::format("{} substeps on; {} perturbed runs of the oracle are apart by {:.3g} ± {:.2g}",
@@ -102,10 +102,10 @@ std::int64_t doubled(const ParticleState& s, const ParticleState& start, const P
   return count;
 }
 
-void judge_mass(const Run& r, const Fixture& fixture, const Judgement& oracle, Sheet& sheet) {
+void check_mass(const Run& r, const Fixture& fixture, const PreparedReference& oracle, RowBuilder& builder) {
   const auto n = fixture.state.size();
   const auto exact = [&](const char* field, std::int64_t off, const std::string& why, std::int64_t id) {
-    CheckRow& row = sheet.row("mass", field, "1");
+    CheckRow& row = builder.row("mass", field, "1");
     compare(static_cast<double>(off), 0, row, id);
     row.n = n;
     if (off != 0) row.reason = fmt::format("{} {}", off, why);
@@ -119,12 +119,12 @@ void judge_mass(const Run& r, const Fixture& fixture, const Judgement& oracle, S
   exact("finite", bad, "particles are no numbers", bad_id);
   const std::int64_t twins = doubled(r.end, fixture.state, oracle.later, 0.01 * fixture.scene.particle_spacing, one);
   exact("distinct", twins, "particles are another one's copy", one);
-  const AuditResult& last = r.looks.back();
+  const AuditResult& last = r.samples.back();
   std::int64_t total = 0;
   for (const auto count : last.particles_at) total += count;
   exact("places", std::abs(total - n), "particles are in no place or in two", -1);
-  const auto lost = static_cast<std::size_t>(Place::lost);
-  exact("lost", std::max<std::int64_t>(0, last.particles_at[lost] - oracle.later_look.particles_at[lost]),
+  const auto lost = static_cast<std::size_t>(Region::lost);
+  exact("lost", std::max<std::int64_t>(0, last.particles_at[lost] - oracle.later_sample.particles_at[lost]),
         "particles more than the oracle's are outside the domain", -1);
 }
 
@@ -139,53 +139,54 @@ double depth_tolerance(const Scene& scene, double oracle_deepest) {
   return oracle_deepest == 0 && !scene.floor ? std::max(0.0, rounding - scene.contact_distance()) : rounding;
 }
 
-void judge_containment(const Run& r, const Scene& scene, const Judgement& oracle, Sheet& sheet) {
+void check_containment(const Run& r, const Scene& scene, const PreparedReference& oracle, RowBuilder& builder) {
   double deepest = 0;
   std::int64_t deepest_id = -1, crossed = 0, crossed_id = -1, when = -1, substep = 0;
-  for (std::size_t k = 0; k < r.looks.size(); ++k) {
-    const AuditResult& look = r.looks[k];
-    substep += oracle.stretches[k].substeps;
-    if (look.deepest > deepest) {
-      deepest = look.deepest;
-      deepest_id = look.deepest_particle;
+  for (std::size_t k = 0; k < r.samples.size(); ++k) {
+    const AuditResult& sample = r.samples[k];
+    substep += oracle.segments[k].substeps;
+    if (sample.deepest > deepest) {
+      deepest = sample.deepest;
+      deepest_id = sample.deepest_particle;
     }
-    if (look.crossed > 0 && when < 0) {
+    if (sample.crossed > 0 && when < 0) {
       when = substep;
-      crossed_id = look.first_crossed;
+      crossed_id = sample.first_crossed;
     }
-    crossed = std::max(crossed, look.crossed);
+    crossed = std::max(crossed, sample.crossed);
   }
-  CheckRow& depth = sheet.row("containment", "depth", "m");
+  CheckRow& depth = builder.row("containment", "depth", "m");
   compare(std::max(0.0, deepest - oracle.deepest), depth_tolerance(scene, oracle.deepest), depth, deepest_id);
   if (depth.verdict == Verdict::fail)
     depth.reason = fmt::format("{:.3g} m inside a wall, the oracle's run {:.3g} m", deepest, oracle.deepest);
-  CheckRow& paths = sheet.row("containment", "crossings", "1");
+  CheckRow& paths = builder.row("containment", "crossings", "1");
   compare(static_cast<double>(std::max<std::int64_t>(0, crossed - oracle.crossed)), 0, paths, crossed_id);
   if (paths.verdict == Verdict::fail)
     paths.reason = fmt::format("{} particles went through a wall, first seen {} substeps on", crossed, when);
 }
 
-void judge_conservation(Backend& backend, const Fixture& fixture, const Judgement& oracle, Sheet& sheet) {
+void check_conservation(Backend& backend, const Fixture& fixture, const PreparedReference& oracle,
+                        RowBuilder& builder) {
   backend.load(fixture.scene, oracle.walls, fixture.state);
   const auto n = oracle.given.fields.density.size(), m = oracle.own.fields.boundary_volume.size();
   Fields got = Fields::unwritten(n, m);
   if (const Status status = backend.evaluate(got, &oracle.inputs); !status.ok())
-    return sheet.failed("conservation", describe(status));
+    return builder.failed("conservation", describe(status));
   if (got.pressure_acceleration.cols() != n || got.viscous_acceleration.cols() != n)
-    return sheet.failed("conservation", "accelerations of another number of particles");
-  judge_momentum(got, all_answered(), fixture, oracle, sheet);
+    return builder.failed("conservation", "accelerations of another number of particles");
+  check_momentum(got, all_answered(), fixture, oracle, builder);
 }
 
-void judge_determinism(Backend& backend, const Fixture& fixture, const Judgement& oracle, const Run& first,
-                       Sheet& sheet) {
+void check_determinism(Backend& backend, const Fixture& fixture, const PreparedReference& oracle, const Run& first,
+                       RowBuilder& builder) {
   const auto n = oracle.own.fields.density.size(), m = oracle.own.fields.boundary_volume.size();
   std::array<Fields, 2> fields{Fields::unwritten(n, m), Fields::unwritten(n, m)};
   for (Fields& f : fields) {
     backend.load(fixture.scene, oracle.walls, fixture.state);
-    if (const Status status = backend.evaluate(f); !status.ok()) return sheet.failed("determinism", describe(status));
+    if (const Status status = backend.evaluate(f); !status.ok()) return builder.failed("determinism", describe(status));
   }
   const auto exact = [&](const char* name, std::int64_t differ) {
-    CheckRow& row = sheet.row("determinism", name, "1");
+    CheckRow& row = builder.row("determinism", name, "1");
     compare(static_cast<double>(differ), 0, row);
     row.n = n;
     if (differ != 0) row.reason = fmt::format("{} values differ from the first time", differ);
@@ -194,7 +195,7 @@ void judge_determinism(Backend& backend, const Fixture& fixture, const Judgement
   exact("fields", differing(a.density, b.density) + differing(a.pressure, b.pressure) +
                       differing(a.acceleration, b.acceleration) + differing(a.boundary_volume, b.boundary_volume));
   const Run second = run(backend, fixture, oracle, oracle.repeated);
-  if (!second.status.ok()) return sheet.failed("determinism", describe(second.status));
+  if (!second.status.ok()) return builder.failed("determinism", describe(second.status));
   exact("run", differing(first.early.position, second.early.position) +
                    differing(first.early.velocity, second.early.velocity));
   const auto &once = first.counted, &twice = second.counted;
@@ -218,20 +219,20 @@ Eigen::VectorXd by_original(const TransformedProblem& problem, const Matrix& m) 
   return out;
 }
 
-void judge_invariance(Backend& backend, const Judgement& oracle, Sheet& sheet) {
-  for (const TransformedAnswer& t : oracle.transformed) {
-    const auto n = t.answer.fields.density.size(), m = t.answer.fields.boundary_volume.size();
+void check_invariance(Backend& backend, const PreparedReference& oracle, RowBuilder& builder) {
+  for (const TransformedSolution& t : oracle.transformed) {
+    const auto n = t.solution.fields.density.size(), m = t.solution.fields.boundary_volume.size();
     backend.load(t.problem.scene, t.walls, t.problem.state);
     Fields got = Fields::unwritten(n, m);
     if (const Status status = backend.evaluate(got); !status.ok())
-      return sheet.failed("invariance", t.problem.name + ": " + describe(status));
+      return builder.failed("invariance", t.problem.name + ": " + describe(status));
     const auto row = [&](const char* field, const char* unit) -> CheckRow& {
-      return sheet.row("invariance", t.problem.name + " " + field, unit);
+      return builder.row("invariance", t.problem.name + " " + field, unit);
     };
     const auto same = [&](const char* field, const char* unit, auto member, int components) {
       compare({by_original(t.problem, got.*member),
-               by_original(t.problem, t.answer.fields.*member),
-               by_original(t.problem, t.answer.tolerance.*member),
+               by_original(t.problem, t.solution.fields.*member),
+               by_original(t.problem, t.solution.tolerance.*member),
                {},
                components},
               row(field, unit));
@@ -244,34 +245,34 @@ void judge_invariance(Backend& backend, const Judgement& oracle, Sheet& sheet) {
 
 }  // namespace
 
-void judge_runs(Backend& backend, const Fixture& fixture, const Judgement& oracle, const CheckSelection& checks,
-                Sheet& sheet) {
+void check_runs(Backend& backend, const Fixture& fixture, const PreparedReference& oracle, const CheckSelection& checks,
+                RowBuilder& builder) {
   const auto wanted = [&](const char* name) { return checks.count(name) > 0; };
-  if (!oracle.stretches.empty()) {
-    const Run r = run(backend, fixture, oracle, oracle.stretches.size());
+  if (!oracle.segments.empty()) {
+    const Run r = run(backend, fixture, oracle, oracle.segments.size());
     const bool whole = r.end.position.cols() == fixture.state.size() && r.end.velocity.cols() == fixture.state.size();
     for (const char* name : {"advanced", "trajectory", "mass", "containment", "determinism"}) {
       if (!checks.count(name)) continue;
       if (!r.status.ok()) {
-        sheet.failed(name, describe(r.status));
+        builder.failed(name, describe(r.status));
       } else if (!whole) {
-        sheet.failed(name, fmt::format("{} positions and {} velocities, not {}", r.end.position.cols(),
-                                       r.end.velocity.cols(), fixture.state.size()));
+        builder.failed(name, fmt::format("{} positions and {} velocities, not {}", r.end.position.cols(),
+                                         r.end.velocity.cols(), fixture.state.size()));
       } else if (name == std::string("advanced")) {
-        judge_advanced(r.views, fixture, oracle.walls, oracle.volumes, sheet);
+        check_advanced(r.views, fixture, oracle.walls, oracle.volumes, builder);
       } else if (name == std::string("trajectory")) {
-        judge_trajectory(r, fixture, oracle, sheet);
+        check_trajectory(r, fixture, oracle, builder);
       } else if (name == std::string("mass")) {
-        judge_mass(r, fixture, oracle, sheet);
+        check_mass(r, fixture, oracle, builder);
       } else if (name == std::string("containment")) {
-        judge_containment(r, fixture.scene, oracle, sheet);
+        check_containment(r, fixture.scene, oracle, builder);
       } else {
-        judge_determinism(backend, fixture, oracle, r, sheet);
+        check_determinism(backend, fixture, oracle, r, builder);
       }
     }
   }
-  if (wanted("conservation")) judge_conservation(backend, fixture, oracle, sheet);
-  if (wanted("invariance")) judge_invariance(backend, oracle, sheet);
+  if (wanted("conservation")) check_conservation(backend, fixture, oracle, builder);
+  if (wanted("invariance")) check_invariance(backend, oracle, builder);
 }
 
 }  // namespace decant

@@ -10,7 +10,7 @@
 namespace decant {
 
 /// Makes the chosen ones of these checks, each from a fresh load.
-void judge_runs(Backend& backend, const Fixture& fixture, const Judgement& oracle, const CheckSelection& checks,
-                Sheet& sheet);
+void check_runs(Backend& backend, const Fixture& fixture, const PreparedReference& oracle, const CheckSelection& checks,
+                RowBuilder& builder);
 
 }  // namespace decant

@@ -20,7 +20,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr const char* axis_names = "xyz";
 
 /// How many reports of one kind were asked for, and what was wrong with the first that was.
-struct Tally {
+struct Counted {
   std::int64_t asked = 0, wrong = 0;
   std::string first;
 
@@ -33,9 +33,9 @@ struct Tally {
   }
 };
 
-class Trouble {
+class Provoked {
  public:
-  Trouble(Backend& backend, const Scene& scene, std::int64_t substep) : backend_(backend), scene_(force_free(scene)) {
+  Provoked(Backend& backend, const Scene& scene, std::int64_t substep) : backend_(backend), scene_(force_free(scene)) {
     scene_.containers.clear();
     scene_.floor.reset();
     const Domain& domain = scene_.domain;
@@ -55,47 +55,47 @@ class Trouble {
     id_ = std::max<Eigen::Index>(0, n - 2);
   }
 
-  void nothing(Tally& tally) {
-    tally.add("nothing wrong, evaluated", evaluated(state_), {});
-    tally.add("nothing wrong, run", run(state_), {});
+  void nothing(Counted& counted) {
+    counted.add("nothing wrong, evaluated", evaluated(state_), {});
+    counted.add("nothing wrong, run", run(state_), {});
   }
 
-  void escapes(Tally& tally) {
+  void escapes(Counted& counted) {
     for (int axis = 0; axis < 3; ++axis) {
       if (scene_.domain.periodic[static_cast<std::size_t>(axis)]) continue;
       for (const bool upper : {false, true}) {
         const std::string face = fmt::format("{}{}", upper ? '+' : '-', axis_names[axis]);
         ParticleState one = state_;
         leaves(one, id_, axis, upper, 2);
-        tally.add("out through " + face, run(one), trouble(Status::escaped, id_, 2));
+        counted.add("out through " + face, run(one), reported(Status::escaped, id_, 2));
         if (state_.size() < 3) continue;
         ParticleState two = state_;
         leaves(two, id_, axis, upper, 2);
         leaves(two, 0, axis, upper, 2);
-        tally.add("two at once out through " + face, run(two), trouble(Status::escaped, 0, 2));
+        counted.add("two at once out through " + face, run(two), reported(Status::escaped, 0, 2));
         two = state_;
         leaves(two, id_, axis, upper, 2);
         leaves(two, 0, axis, upper, 3);
-        tally.add("one after the other out through " + face, run(two), trouble(Status::escaped, id_, 2));
+        counted.add("one after the other out through " + face, run(two), reported(Status::escaped, id_, 2));
       }
     }
   }
 
-  void non_finite(Eigen::Matrix3Xd ParticleState::* member, bool evaluates, Tally& tally) {
+  void non_finite(Eigen::Matrix3Xd ParticleState::* member, bool evaluates, Counted& counted) {
     for (int axis = 0; axis < 3; ++axis)
       for (const double value : {std::nan(""), infinity, -infinity}) {
         ParticleState state = state_;
         (state.*member)(axis, id_) = value;
         const std::string what = fmt::format("{} = {}", axis_names[axis], value);
-        refusable(tally, [&] { tally.add(what + ", run", run(state), trouble(Status::non_finite, id_, 1)); });
+        refusable(counted, [&] { counted.add(what + ", run", run(state), reported(Status::non_finite, id_, 1)); });
         if (!evaluates || !std::isnan(value)) continue;
-        refusable(tally,
-                  [&] { tally.add(what + ", evaluated", evaluated(state), trouble(Status::non_finite, id_, 0)); });
+        refusable(counted,
+                  [&] { counted.add(what + ", evaluated", evaluated(state), reported(Status::non_finite, id_, 0)); });
       }
   }
 
  private:
-  Status trouble(Status::Bit bit, Eigen::Index id, int after) const { return {bit, id, state_.substep + after}; }
+  Status reported(Status::Bit bit, Eigen::Index id, int after) const { return {bit, id, state_.substep + after}; }
   /// So that the particle is outside for the first time so many substeps on.
   void leaves(ParticleState& state, Eigen::Index id, int axis, bool upper, int after) const {
     const Domain& domain = scene_.domain;
@@ -116,11 +116,11 @@ class Trouble {
     return backend_.evaluate(fields);
   }
   template <class Ask>
-  static void refusable(Tally& tally, Ask ask) {
+  static void refusable(Counted& counted, Ask ask) {
     try {
       ask();
     } catch (const std::exception&) {
-      ++tally.asked;  // refused: nobody can take it for a result
+      ++counted.asked;  // refused: nobody can take it for a result
     }
   }
 
@@ -132,18 +132,18 @@ class Trouble {
 
 }  // namespace
 
-void judge_status(Backend& backend, const Scene& scene, std::int64_t substep, Sheet& sheet) {
-  Trouble trouble(backend, scene, substep);
-  Tally none, escaped, position, velocity;
-  trouble.nothing(none);
-  trouble.escapes(escaped);
-  trouble.non_finite(&ParticleState::position, true, position);
-  trouble.non_finite(&ParticleState::velocity, false, velocity);
-  const auto row = [&](const char* field, const Tally& tally) {
-    CheckRow& r = sheet.row("status", field, "1");
-    compare(static_cast<double>(tally.wrong), 0, r);
-    r.n = tally.asked;
-    if (tally.wrong > 0) r.reason = fmt::format("{} of {} reports; {}", tally.wrong, tally.asked, tally.first);
+void check_status(Backend& backend, const Scene& scene, std::int64_t substep, RowBuilder& builder) {
+  Provoked provoked(backend, scene, substep);
+  Counted none, escaped, position, velocity;
+  provoked.nothing(none);
+  provoked.escapes(escaped);
+  provoked.non_finite(&ParticleState::position, true, position);
+  provoked.non_finite(&ParticleState::velocity, false, velocity);
+  const auto row = [&](const char* field, const Counted& counted) {
+    CheckRow& r = builder.row("status", field, "1");
+    compare(static_cast<double>(counted.wrong), 0, r);
+    r.n = counted.asked;
+    if (counted.wrong > 0) r.reason = fmt::format("{} of {} reports; {}", counted.wrong, counted.asked, counted.first);
   };
   row("none", none);
   row("escaped", escaped);

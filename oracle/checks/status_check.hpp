@@ -21,6 +21,6 @@ namespace decant {
 ///   velocity    the same of velocities, in a run
 /// A backend may refuse to load what is no finite number instead.
 /// \param substep  at which states are loaded
-void judge_status(Backend& backend, const Scene& scene, std::int64_t substep, Sheet& sheet);
+void check_status(Backend& backend, const Scene& scene, std::int64_t substep, RowBuilder& builder);
 
 }  // namespace decant

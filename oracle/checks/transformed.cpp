@@ -27,7 +27,7 @@ TransformedProblem permuted(const Scene& scene, const ParticleState& state, unsi
 }
 
 TransformedProblem moved(const Scene& scene, const ParticleState& state, const Vec3& by) {
-  TransformedProblem p{"moved", scene, state, ids_of(state)};
+  TransformedProblem p{"translated", scene, state, ids_of(state)};
   p.scene.domain.min += by;
   p.scene.domain.max += by;
   if (p.scene.floor) p.scene.floor->height += by.z();
@@ -48,7 +48,7 @@ SolidBox turned(const SolidBox& box) {
 }
 
 TransformedProblem turned(const Scene& scene, const ParticleState& state) {
-  TransformedProblem p{"turned", scene, state, ids_of(state)};
+  TransformedProblem p{"rotated", scene, state, ids_of(state)};
   const SolidBox domain = turned(SolidBox{scene.domain.min, scene.domain.max});
   p.scene.domain.min = domain.min;
   p.scene.domain.max = domain.max;

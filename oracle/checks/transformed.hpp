@@ -12,7 +12,7 @@
 namespace decant {
 
 struct TransformedProblem {
-  std::string name;  // "permuted", "moved", "turned"
+  std::string name;  // "permuted", "translated", "rotated"
   Scene scene;
   ParticleState state;                 // fp32-representable
   std::vector<Eigen::Index> original;  // N, whose id each particle had

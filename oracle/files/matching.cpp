@@ -34,9 +34,9 @@ Matching match_ids(const IdVector& expected, const IdVector& found) {
     for (const std::int64_t id : expected) matching.place.push_back(places[id].front());
     return matching;
   }
-  for (const auto& [kind, text] : first) matching.trouble += (matching.trouble.empty() ? "" : ", ") + text;
+  for (const auto& [kind, text] : first) matching.mismatch += (matching.mismatch.empty() ? "" : ", ") + text;
   if (matching.faults > static_cast<std::int64_t>(first.size()))
-    matching.trouble += fmt::format("; {} ids in all", matching.faults);
+    matching.mismatch += fmt::format("; {} ids in all", matching.faults);
   return matching;
 }
 

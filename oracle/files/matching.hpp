@@ -11,10 +11,10 @@
 namespace decant {
 
 struct Matching {
-  std::vector<Eigen::Index> place;  // of each expected id in what was found; empty on trouble
+  std::vector<Eigen::Index> place;  // of each expected id in what was found; empty where ids do not match
   /// Ids that are missing, there twice, or of no particle; and the smallest of each kind in words.
   std::int64_t faults = 0;
-  std::string trouble;
+  std::string mismatch;
 
   bool ok() const { return faults == 0; }
   /// Columns (or values) in the expected order.

@@ -152,12 +152,13 @@ Eigen::VectorXd tolerance_of(const State& oracle, const std::string& name, const
   return tolerance;
 }
 
-void judge_field(const State& oracle, const State& port, const Matching& ids, const std::string& name, Sheet& sheet) {
+void check_field(const State& oracle, const State& port, const Matching& ids, const std::string& name,
+                 RowBuilder& builder) {
   const std::string path = port.field(name);
   const NamedField expected = read_field(oracle.in, oracle.field(name), oracle.n);
   require(oracle.in, oracle.field(name), expected.values, true);
   const Eigen::VectorXd tolerance = tolerance_of(oracle, name, expected);
-  CheckRow& row = sheet.row("fields", name, expected.unit.c_str());
+  CheckRow& row = builder.row("fields", name, expected.unit.c_str());
   if (!port.has(name)) {
     row.reason = not_given;
     return;
@@ -184,31 +185,31 @@ void judge_field(const State& oracle, const State& port, const Matching& ids, co
   if (row.worst_id >= 0) row.worst_id = oracle.ids[row.worst_id];
 }
 
-void judge_state(const State& oracle, const State& port, Sheet& sheet) {
+void check_state(const State& oracle, const State& port, RowBuilder& builder) {
   if (oracle.n == 0) oracle.in.fail(oracle.path + "/fields", "no particle", "at least one field, one particle");
   // Without ids a wrong number of particles is a wrong shape; with them, ids that are missing.
   if (!oracle.has_ids && !port.has_ids && port.n != oracle.n && !port.names.empty())
     port.in.fail(port.field(port.names.front()), fmt::format("{} particles", port.n),
                  fmt::format("{}, as the reference has", oracle.n));
   if (const Matching own = match_ids(oracle.ids, oracle.ids); !own.ok())
-    oracle.in.fail(oracle.path + "/id", own.trouble, "each id once");
+    oracle.in.fail(oracle.path + "/id", own.mismatch, "each id once");
   for (const char* group : {"/condition", "/terms"})
     if (oracle.in.has(oracle.path + group))
       for (const auto& name : oracle.in.children(oracle.path + group))
         if (!oracle.has(name))
           oracle.in.fail(oracle.path + group + "/" + name, "of no field", "one of " + oracle.path + "/fields");
   const Matching ids = match_ids(oracle.ids, port.ids);
-  if (oracle.has_ids || port.has_ids) judge_ids(ids, oracle.n, sheet);
-  for (const auto& name : oracle.names) judge_field(oracle, port, ids, name, sheet);
+  if (oracle.has_ids || port.has_ids) check_ids(ids, oracle.n, builder);
+  for (const auto& name : oracle.names) check_field(oracle, port, ids, name, builder);
   for (const auto& name : port.names)
     if (!oracle.has(name))
-      sheet.row("fields", name, "").reason = oracle.in.file().filename().string() + " has no such field";
+      builder.row("fields", name, "").reason = oracle.in.file().filename().string() + " has no such field";
 }
 
 }  // namespace
 
-JudgedResults judge_named_fields(const std::filesystem::path& reference, const std::filesystem::path& results,
-                                 const std::string& name) {
+CheckedResults check_named_fields(const std::filesystem::path& reference, const std::filesystem::path& results,
+                                  const std::string& name) {
   const Hdf5Reader oracle(reference), port(results);
   for (const auto& [in, kind, schema] :
        {std::tuple{&oracle, "decant_reference", reference_schema}, std::tuple{&port, "decant_results", results_schema}})
@@ -221,24 +222,24 @@ JudgedResults judge_named_fields(const std::filesystem::path& reference, const s
   const auto has = [](const std::vector<std::string>& states, const std::string& state) {
     return std::find(states.begin(), states.end(), state) != states.end();
   };
-  JudgedResults judged;
+  CheckedResults judged;
   judged.states = static_cast<std::int64_t>(expected.size());
   for (const auto& state : expected) {
-    Sheet sheet(info, reference.stem().string() + state);
+    RowBuilder builder(info, reference.stem().string() + state);
     const State theirs(oracle, state);
     if (has(found, state)) {
-      judge_state(theirs, State(port, state), sheet);
+      check_state(theirs, State(port, state), builder);
     } else {
       judged.missing_states.push_back(state.empty() ? "/" : state);
-      for (const auto& field : theirs.names) sheet.row("fields", field, "").reason = not_given;
+      for (const auto& field : theirs.names) builder.row("fields", field, "").reason = not_given;
     }
-    judged.add(sheet.take());
+    judged.add(builder.take());
   }
   for (const auto& state : found) {
     if (has(expected, state)) continue;
-    Sheet sheet(info, reference.stem().string() + state);
-    sheet.row("fields", "all", "").reason = oracle.file().filename().string() + " has no such state";
-    judged.add(sheet.take());
+    RowBuilder builder(info, reference.stem().string() + state);
+    builder.row("fields", "all", "").reason = oracle.file().filename().string() + " has no such state";
+    judged.add(builder.take());
   }
   return judged;
 }

@@ -30,7 +30,7 @@ inline constexpr double default_roundings = 8;
 /// what is wrong: a shape that is not [N] or [N,3], a reference that is not finite, a negative
 /// tolerance, a condition sum without its number of terms.
 /// \param name  stands as the rows' backend, "file" as their executor
-JudgedResults judge_named_fields(const std::filesystem::path& reference, const std::filesystem::path& results,
-                                 const std::string& name);
+CheckedResults check_named_fields(const std::filesystem::path& reference, const std::filesystem::path& results,
+                                  const std::string& name);
 
 }  // namespace decant

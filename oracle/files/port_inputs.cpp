@@ -88,7 +88,7 @@ void write_poses(Hdf5Writer& out, const std::string& group, const Scene& scene, 
 
 }  // namespace
 
-void write_port_inputs(const std::filesystem::path& file, const Fixture& fixture, const Judgement& oracle) {
+void write_port_inputs(const std::filesystem::path& file, const Fixture& fixture, const PreparedReference& oracle) {
   const Scene& scene = fixture.scene;
   const ParticleState& state = fixture.state;
   Hdf5Writer out(file);

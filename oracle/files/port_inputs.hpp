@@ -15,6 +15,6 @@ inline constexpr std::int64_t inputs_schema = 1;
 
 /// Throws std::runtime_error naming the file where writing fails.
 /// \param oracle  prepared for any checks
-void write_port_inputs(const std::filesystem::path& file, const Fixture& fixture, const Judgement& oracle);
+void write_port_inputs(const std::filesystem::path& file, const Fixture& fixture, const PreparedReference& oracle);
 
 }  // namespace decant

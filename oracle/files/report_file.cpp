@@ -50,15 +50,16 @@ constexpr std::array<std::pair<const char*, IntegerColumn>, 6> integer_columns =
 struct Reals {
   const char* name;
   RealColumn member;
-  const char* unit;  // empty: the row's, or none
+  const char* unit;           // empty: the row's, or none
+  const char* name_2 = name;  // in schema 2
 };
 constexpr std::array<Reals, 10> real_columns = {{
-    {"value", &CheckRow::value, ""},
+    {"error", &CheckRow::error, "", "value"},
     {"tolerance", &CheckRow::tolerance, ""},
     {"score", &CheckRow::score, ""},
     {"median_score", &CheckRow::median_score, ""},
-    {"float_score", &CheckRow::float_score, ""},
-    {"got", &CheckRow::got, ""},
+    {"fp32_reference_score", &CheckRow::fp32_reference_score, "", "float_score"},
+    {"actual", &CheckRow::actual, "", "got"},
     {"expected", &CheckRow::expected, ""},
     {"worst_x", &CheckRow::worst_x, "m"},
     {"worst_y", &CheckRow::worst_y, "m"},
@@ -74,18 +75,18 @@ Eigen::VectorXd real_column(const std::vector<CheckRow>& rows, RealColumn member
 void write_summary(Hdf5Writer& out, const std::vector<CheckRow>& rows) {
   for (const auto& [name, member] : text_columns) {
     std::vector<std::string> values;
-    for (const auto& row : rows) values.push_back(member == &CheckRow::reason ? judged_reason(row) : row.*member);
+    for (const auto& row : rows) values.push_back(member == &CheckRow::reason ? reason_of(row) : row.*member);
     out.strings(std::string("/summary/") + name, values);
   }
   std::vector<std::string> verdicts;
-  for (const auto& row : rows) verdicts.push_back(to_string(judged_verdict(row)));
+  for (const auto& row : rows) verdicts.push_back(to_string(verdict_of(row)));
   out.strings("/summary/verdict", verdicts, "pass, fail or not_run");
   for (const auto& [name, member] : integer_columns) {
     IdVector values(static_cast<Eigen::Index>(rows.size()));
     for (std::size_t k = 0; k < rows.size(); ++k) values[static_cast<Eigen::Index>(k)] = rows[k].*member;
     out.integers(std::string("/summary/") + name, values);
   }
-  for (const auto& [name, member, unit] : real_columns)
+  for (const auto& [name, member, unit, name_2] : real_columns)
     out.vector(std::string("/summary/") + name, real_column(rows, member), unit);
 
   std::vector<Eigen::VectorXd> quantiles(quantile_percent.size(),
@@ -101,7 +102,7 @@ void write_summary(Hdf5Writer& out, const std::vector<CheckRow>& rows) {
 
 /// Arrays of one failing row, whole or the worst values; the rest is in the summary.
 void write_check(Hdf5Writer& out, const std::string& group, const CheckRow& row, bool whole) {
-  Eigen::VectorXd error = row.error, tolerance = row.tolerances;
+  Eigen::VectorXd error = row.errors, tolerance = row.tolerances;
   if (!whole) {
     const Eigen::VectorXd scores = scores_of(row);
     IdVector order = IdVector::LinSpaced(scores.size(), 0, scores.size() - 1);
@@ -110,7 +111,7 @@ void write_check(Hdf5Writer& out, const std::string& group, const CheckRow& row,
       return scores[a] != scores[b] ? scores[a] > scores[b] : a < b;
     });
     const IdVector worst = order.head(kept);
-    error = row.error(worst).eval();
+    error = row.errors(worst).eval();
     tolerance = row.tolerances(worst).eval();
     out.integers(group + "/index", worst, "place in the whole array, worst first");
   }
@@ -129,13 +130,20 @@ void write_checks(Hdf5Writer& out, const std::vector<CheckRow>& rows) {
   int worst_left = rows_with_worst_values;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const CheckRow& row = rows[k];
-    if (judged_verdict(row) != Verdict::fail || !has_arrays(row)) continue;
-    const std::int64_t bytes = 2 * 4 * row.error.size() + 4096;
+    if (verdict_of(row) != Verdict::fail || !has_arrays(row)) continue;
+    const std::int64_t bytes = 2 * 4 * row.errors.size() + 4096;
     const bool whole = bytes <= budget;
     if (whole) budget -= bytes;
     if (!whole && worst_left-- <= 0) continue;
     write_check(out, fmt::format("/checks/{:06}", k), row, whole);
   }
+}
+
+/// A field's name in schema 2 as it is now.
+std::string today(const std::string& field) {
+  for (const auto& [before, now] : {std::pair("moved ", "translated "), std::pair("turned ", "rotated ")})
+    if (field.starts_with(before)) return now + field.substr(std::string_view(before).size());
+  return field;
 }
 
 }  // namespace
@@ -148,7 +156,7 @@ void write_report(const std::filesystem::path& file, const Report& report) {
   out.attribute("/", "verdict", status == 0 ? "pass" : status == 1 ? "fail" : "not_run");
   write_summary(out, rows);
   write_checks(out, rows);
-  if (report.surroundings) write_vtkhdf(out, *report.surroundings);
+  if (report.neighborhood) write_vtkhdf(out, *report.neighborhood);
   out.group("/provenance");
   for (const auto& [name, text] : report.provenance) out.attribute("/provenance", name, text);
   out.commit();
@@ -157,7 +165,8 @@ void write_report(const std::filesystem::path& file, const Report& report) {
 Report read_report(const std::filesystem::path& file) {
   const Hdf5Reader in(file);
   const std::int64_t schema = in.integer_attribute("/", "decant_report");
-  if (schema != report_schema) in.fail("/@decant_report", std::to_string(schema), std::to_string(report_schema));
+  if (schema != report_schema && schema != 2)
+    in.fail("/@decant_report", std::to_string(schema), fmt::format("2 or {}", report_schema));
   Report report;
   const std::vector<std::string> verdicts = in.strings("/summary/verdict");
   const auto n = static_cast<std::int64_t>(verdicts.size());
@@ -170,8 +179,8 @@ Report read_report(const std::filesystem::path& file) {
     const IdVector values = in.integers(std::string("/summary/") + name, n);
     for (Eigen::Index k = 0; k < n; ++k) report.rows[static_cast<std::size_t>(k)].*member = values[k];
   }
-  for (const auto& [name, member, unit] : real_columns) {
-    const Eigen::VectorXd values = in.vector(std::string("/summary/") + name, n);
+  for (const auto& [name, member, unit, name_2] : real_columns) {
+    const Eigen::VectorXd values = in.vector(std::string("/summary/") + (schema == 2 ? name_2 : name), n);
     for (Eigen::Index k = 0; k < n; ++k) report.rows[static_cast<std::size_t>(k)].*member = values[k];
   }
   for (const int percent : quantile_percent) {
@@ -184,6 +193,8 @@ Report read_report(const std::filesystem::path& file) {
       in.fail("/summary/verdict", fmt::format("{} at {}", text, k), "pass, fail or not_run");
     report.rows[k].verdict = text == "pass" ? Verdict::pass : text == "fail" ? Verdict::fail : Verdict::not_run;
   }
+  if (schema == 2)
+    for (CheckRow& row : report.rows) row.field = today(row.field);
   for (const auto& name : in.attribute_names("/provenance"))
     report.provenance[name] = in.text_attribute("/provenance", name);
   return report;

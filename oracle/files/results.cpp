@@ -1,7 +1,8 @@
 /// \file
-/// A results file of a fixture: which of its fields are there, whose they are, and their judgement.
+/// A results file of a fixture: which of its fields are there, whose they are, and their rows.
 #include "oracle/files/results.hpp"
 
+#include "oracle/checks/neighborhood.hpp"
 #include "oracle/files/hdf5_io.hpp"
 #include "reference/sampling.hpp"
 
@@ -125,21 +126,21 @@ CheckRow untold(const CheckRow& row) {
   plain.check = row.check;
   plain.field = row.field;
   plain.unit = row.unit;
-  plain.float_score = row.float_score;
+  plain.fp32_reference_score = row.fp32_reference_score;
   plain.reason = "the ids do not tell which particle is which";
   return plain;
 }
 
 }  // namespace
 
-void judge_ids(const Matching& ids, Eigen::Index expected, Sheet& sheet) {
-  CheckRow& row = sheet.row("ids", "id", "1");
+void check_ids(const Matching& ids, Eigen::Index expected, RowBuilder& builder) {
+  CheckRow& row = builder.row("ids", "id", "1");
   compare(static_cast<double>(ids.faults), 0, row);
   row.n = expected;
-  if (!ids.ok()) row.reason = ids.trouble;
+  if (!ids.ok()) row.reason = ids.mismatch;
 }
 
-void JudgedResults::add(std::vector<CheckRow> rows) {
+void CheckedResults::add(std::vector<CheckRow> rows) {
   for (CheckRow& row : rows) {
     const bool absent_one = row.verdict == Verdict::not_run && row.reason == not_given;
     (absent_one ? absent : given).push_back(std::move(row));
@@ -155,27 +156,28 @@ Results read_results(const std::filesystem::path& file, const Fixture& fixture) 
   return ResultsReader(file, fixture).read();
 }
 
-JudgedResults judge(const Results& results, const std::string& name, const Fixture& fixture, const Judgement& oracle,
-                    const CheckSelection& checks) {
+CheckedResults run_checks(const Results& results, const std::string& name, const Fixture& fixture,
+                          const PreparedReference& oracle, const CheckSelection& checks) {
   const BackendInfo info{name, "", "file", results.device, ""};
-  Sheet sheet(info, fixture.name);
+  RowBuilder builder(info, fixture.name);
   if (checks.count("fields")) {
-    judge_stages(results.own_fields, results.own, oracle, sheet);
-    judge_staged(results.staged_fields, results.staged, oracle, sheet);
-    judge_evaluation(results.own_fields, results.own, oracle, sheet);
+    check_stages(results.own_fields, results.own, oracle, builder);
+    check_staged(results.staged_fields, results.staged, oracle, builder);
+    check_evaluation(results.own_fields, results.own, oracle, builder);
   }
-  if (checks.count("substep")) judge_substep(results.after_state, results.after, fixture, oracle, sheet);
-  if (checks.count("conservation")) judge_momentum(results.staged_fields, results.staged, fixture, oracle, sheet);
-  std::vector<CheckRow> rows = sheet.take();
-  JudgedResults judged;
+  if (checks.count("substep")) check_substep(results.after_state, results.after, fixture, oracle, builder);
+  if (checks.count("conservation")) check_momentum(results.staged_fields, results.staged, fixture, oracle, builder);
+  std::vector<CheckRow> rows = builder.take();
+  CheckedResults judged;
   if (results.has_ids) {
-    Sheet ids(info, fixture.name);
-    judge_ids(results.ids, fixture.state.size(), ids);
+    RowBuilder ids(info, fixture.name);
+    check_ids(results.ids, fixture.state.size(), ids);
     judged.add(ids.take());
     if (!results.ids.ok())
       for (CheckRow& row : rows)
         if (row.reason != not_given && row.check != "boundary_volume") row = untold(row);
   }
+  locate(fixture, oracle.walls, rows);
   judged.add(std::move(rows));
   return judged;
 }

@@ -20,7 +20,7 @@ inline constexpr std::int64_t results_schema = 1;
 
 /// Rows of what was given, and of what was not (each not_run, with its reason). What was not given
 /// was not asked about, so it makes no verdict better or worse.
-struct JudgedResults {
+struct CheckedResults {
   std::vector<CheckRow> given, absent;
   std::int64_t states = 1;                  // of the reference
   std::vector<std::string> missing_states;  // of them, in the results
@@ -40,7 +40,7 @@ struct Results {
 };
 
 /// Row `ids`: how many are missing, doubled or of no particle. \param expected  their number
-void judge_ids(const Matching& ids, Eigen::Index expected, Sheet& sheet);
+void check_ids(const Matching& ids, Eigen::Index expected, RowBuilder& builder);
 
 /// The checks that a results file can answer: fields, substep, conservation.
 const CheckSelection& results_checks();
@@ -52,7 +52,7 @@ Results read_results(const std::filesystem::path& file, const Fixture& fixture);
 /// Each field that was given, by the tolerance that a backend's has.
 /// \param name  stands as the rows' backend, "file" as their executor
 /// \param oracle  prepared for these checks at least; \param checks  of results_checks()
-JudgedResults judge(const Results& results, const std::string& name, const Fixture& fixture, const Judgement& oracle,
-                    const CheckSelection& checks);
+CheckedResults run_checks(const Results& results, const std::string& name, const Fixture& fixture,
+                          const PreparedReference& oracle, const CheckSelection& checks);
 
 }  // namespace decant

@@ -23,7 +23,7 @@ void write_cells(Hdf5Writer& out, const std::string& kind, std::int64_t cells) {
 
 }  // namespace
 
-void write_vtkhdf(Hdf5Writer& out, const Surroundings& points) {
+void write_vtkhdf(Hdf5Writer& out, const Neighborhood& points) {
   const std::string group = root, data = group + "/PointData/";
   const Eigen::Index n = points.position.cols();
   out.attribute(group, "Version", std::vector<std::int64_t>{2, 0});

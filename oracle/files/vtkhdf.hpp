@@ -9,6 +9,6 @@ namespace decant {
 
 /// Writes the group /VTKHDF. Readers of VTK ignore the file's other groups, and the attributes that
 /// say which row the points belong to.
-void write_vtkhdf(Hdf5Writer& out, const Surroundings& points);
+void write_vtkhdf(Hdf5Writer& out, const Neighborhood& points);
 
 }  // namespace decant

@@ -65,12 +65,12 @@ FieldDeficit deficit(const Matrix& whole, const Matrix& partial, const Matrix& t
 
 }  // namespace
 
-Instant look_at(const Scene& scene, const Walls& walls, const WallAnswer& volumes, const ParticleState& state) {
+Instant look_at(const Scene& scene, const Walls& walls, const WallSolution& volumes, const ParticleState& state) {
   Instant now;
   now.state = state;
   now.walls = pose_walls(scene, walls, scene.time_at(state.substep));
   find_neighbors(scene, state.position, now.walls.position, NeighborSearch::cells, now.near);
-  OracleAnswer complete = answer(scene, walls, volumes, state);
+  ReferenceSolution complete = reference_solution(scene, walls, volumes, state);
   now.fields = std::move(complete.fields);
   now.tolerance = std::move(complete.tolerance);
   return now;

@@ -18,13 +18,14 @@ struct Line {
   std::string backend, fixture;
   Verdict verdict = Verdict::pass;
   const CheckRow* worst = nullptr;
+  const CheckRow* first_stage = nullptr;  // that fails, in the order in which fields follow from each other
 };
 
 /// A row that fails is worse than one that passes, whatever their scores: some checks fail by
 /// count.
 bool worse(const CheckRow& a, const CheckRow& b) {
-  const bool a_fails = judged_verdict(a) == Verdict::fail;
-  if (a_fails != (judged_verdict(b) == Verdict::fail)) return a_fails;
+  const bool a_fails = verdict_of(a) == Verdict::fail;
+  if (a_fails != (verdict_of(b) == Verdict::fail)) return a_fails;
   // NaN is the worst score there is.
   if (std::isnan(a.score) || std::isnan(b.score)) return std::isnan(a.score) && !std::isnan(b.score);
   return a.score > b.score;
@@ -33,6 +34,19 @@ bool worse(const CheckRow& a, const CheckRow& b) {
 Verdict combined(Verdict a, Verdict b) {
   if (a == Verdict::fail || b == Verdict::fail) return Verdict::fail;
   return a == Verdict::not_run || b == Verdict::not_run ? Verdict::not_run : Verdict::pass;
+}
+
+/// The stages of a substep, each from the one before: what goes wrong in one spoils the later ones.
+bool is_stage(const CheckRow& row) {
+  static const std::set<std::string> stages = {"neighbors", "boundary_volume", "density", "pressure"};
+  return stages.count(row.check) > 0;
+}
+
+/// The worst row, and where it comes from.
+std::string check_of(const Line& line) {
+  if (!line.worst) return "-";
+  const bool earlier = line.first_stage && line.first_stage->check != line.worst->check;
+  return check_label(*line.worst) + (earlier ? fmt::format("; first: {}", line.first_stage->check) : "");
 }
 
 std::vector<Line> lines_of(const std::vector<CheckRow>& rows) {
@@ -45,7 +59,8 @@ std::vector<Line> lines_of(const std::vector<CheckRow>& rows) {
       lines.push_back({backend, row.fixture});
       line = lines.end() - 1;
     }
-    line->verdict = combined(line->verdict, judged_verdict(row));
+    line->verdict = combined(line->verdict, verdict_of(row));
+    if (!line->first_stage && is_stage(row) && verdict_of(row) == Verdict::fail) line->first_stage = &row;
     if (row.verdict != Verdict::not_run && (!line->worst || worse(row, *line->worst))) line->worst = &row;
   }
   return lines;
@@ -59,8 +74,8 @@ std::string details(const CheckRow& row) {
   if (!std::isnan(row.expected)) {
     const char* components[] = {"x: ", "y: ", "z: "};
     const bool component = row.worst_component >= 0 && row.worst_component < 3;
-    text += fmt::format("{}got {:.9g}, expected {:.9g}{}", component ? components[row.worst_component] : "", row.got,
-                        row.expected, unit_of(row));
+    text += fmt::format("{}actual {:.9g}, expected {:.9g}{}", component ? components[row.worst_component] : "",
+                        row.actual, row.expected, unit_of(row));
   }
   if (std::isnan(row.worst_x)) return text;
   if (!text.empty()) text += "; ";
@@ -113,22 +128,23 @@ std::string check_label(const CheckRow& row) {
 }
 
 std::string in_full(const CheckRow& row) {
-  const Verdict verdict = judged_verdict(row);
+  const Verdict verdict = verdict_of(row);
   std::string text = wrapped(
       fmt::format("{}: {} on {}: {}", to_string(verdict), backend_label(row), row.fixture, check_label(row)), 0);
   if (verdict == Verdict::fail && row.n > 0) {
     const std::string unit = unit_of(row);
-    std::string figures = fmt::format("error {:.4g}{}, tolerance {:.4g}{}, score {:.3g}", row.value, unit,
+    std::string figures = fmt::format("error {:.4g}{}, tolerance {:.4g}{}, score {:.3g}", row.error, unit,
                                       row.tolerance, unit, row.score);
     if (row.worst_id >= 0)
       figures = fmt::format("{}particle {}: ", row.field == "boundary_volume" ? "wall " : "", row.worst_id) + figures;
     figures += fmt::format("; median score {:.3g}", row.median_score);
-    if (!std::isnan(row.float_score)) figures += fmt::format("; sequential fp32 scores {:.3g}", row.float_score);
+    if (!std::isnan(row.fp32_reference_score))
+      figures += fmt::format("; sequential fp32 scores {:.3g}", row.fp32_reference_score);
     figures += fmt::format("; {} compared", row.n);
     if (row.excluded > 0) figures += fmt::format(", {} ambiguous left out", row.excluded);
     text += wrapped(figures, 4) + wrapped(details(row), 4);
   }
-  return text + wrapped(judged_reason(row), 4);
+  return text + wrapped(reason_of(row), 4);
 }
 
 namespace {
@@ -173,13 +189,13 @@ std::string console_table(const Report& report) {
   std::string text = fmt::format("{:{}}  {:{}}  {:7}  {:>11}  {}\n", "backend", backend_width, "fixture", fixture_width,
                                  "verdict", "worst score", "check");
   for (const auto& line : lines)
-    text += fmt::format("{:{}}  {:{}}  {:7}  {:>11}  {}\n", fitted(line.backend, backend_width), backend_width,
-                        fitted(line.fixture, fixture_width), fixture_width, to_string(line.verdict),
-                        line.worst ? fmt::format("{:.3g}", line.worst->score) : "-",
-                        line.worst ? fitted(check_label(*line.worst), check_width) : "-");
+    text +=
+        fmt::format("{:{}}  {:{}}  {:7}  {:>11}  {}\n", fitted(line.backend, backend_width), backend_width,
+                    fitted(line.fixture, fixture_width), fixture_width, to_string(line.verdict),
+                    line.worst ? fmt::format("{:.3g}", line.worst->score) : "-", fitted(check_of(line), check_width));
   std::string rest;
   for (const auto& row : report.rows)
-    if (judged_verdict(row) != Verdict::pass) rest += in_full(row);
+    if (verdict_of(row) != Verdict::pass) rest += in_full(row);
   if (!rest.empty()) text += "\n" + rest;
   return text + "\n" + verdict_line(report) + "\n";
 }

@@ -10,12 +10,12 @@
 
 namespace decant {
 
-bool has_arrays(const CheckRow& row) { return row.error.size() > 0 && row.error.size() == row.tolerances.size(); }
+bool has_arrays(const CheckRow& row) { return row.errors.size() > 0 && row.errors.size() == row.tolerances.size(); }
 
 Eigen::VectorXd scores_of(const CheckRow& row) {
-  Eigen::VectorXd scores(row.error.size());
+  Eigen::VectorXd scores(row.errors.size());
   for (Eigen::Index k = 0; k < scores.size(); ++k) {
-    const double error = std::abs(row.error[k]);
+    const double error = std::abs(row.errors[k]);
     const double score = error == 0 && row.tolerances[k] == 0 ? 0 : error / row.tolerances[k];
     scores[k] = std::isnan(score) ? std::numeric_limits<double>::infinity() : score;
   }
@@ -47,27 +47,27 @@ const char* to_string(Verdict verdict) {
   return "fail";
 }
 
-Verdict judged_verdict(const CheckRow& row) {
-  const bool stands = row.score >= 0 && row.score <= 1 && !std::isnan(row.value) && !std::isnan(row.tolerance);
+Verdict verdict_of(const CheckRow& row) {
+  const bool stands = row.score >= 0 && row.score <= 1 && !std::isnan(row.error) && !std::isnan(row.tolerance);
   return row.verdict == Verdict::pass && !stands ? Verdict::fail : row.verdict;
 }
 
-std::string judged_reason(const CheckRow& row) {
-  if (judged_verdict(row) == row.verdict) return row.reason;
-  return fmt::format("said to pass with score {}, value {}, tolerance {}", row.score, row.value, row.tolerance);
+std::string reason_of(const CheckRow& row) {
+  if (verdict_of(row) == row.verdict) return row.reason;
+  return fmt::format("said to pass with score {}, error {}, tolerance {}", row.score, row.error, row.tolerance);
 }
 
 void condense(CheckRow& row) {
   row.score_quantiles = quantiles_of(row);
-  if (judged_verdict(row) != Verdict::pass) return;
-  row.error.resize(0);
+  if (verdict_of(row) != Verdict::pass) return;
+  row.errors.resize(0);
   row.tolerances.resize(0);
 }
 
 int exit_status(const Report& report) {
   bool fails = false, missing = report.rows.empty();
   for (const auto& row : report.rows) {
-    const Verdict verdict = judged_verdict(row);
+    const Verdict verdict = verdict_of(row);
     fails |= verdict == Verdict::fail;
     missing |= verdict == Verdict::not_run;
   }

@@ -33,17 +33,17 @@ struct CheckRow {
   std::string field;
   std::string unit;
   std::int64_t n = 0;    // values compared
-  double value = 0;      // largest |error|, in `unit`
+  double error = 0;      // largest |error|, in `unit`
   double tolerance = 0;  // that value's own tolerance
   double score = 0;      // max |error| / tolerance; passes where score <= 1
   double median_score = 0;
-  double float_score = 0;             // score of the oracle's source in sequential fp32; NaN where none
+  double fp32_reference_score = 0;    // score of the oracle's source in sequential fp32; NaN where none
   std::int64_t worst_id = -1;         // a wall particle's where the field is boundary_volume
   std::int64_t worst_component = -1;  // 0, 1, 2 of a vector
   /// The worst value and the oracle's, in `unit`; `expected` is no number where a row has none.
-  double got = no_number, expected = no_number;
+  double actual = no_number, expected = no_number;
   /// Where the worst particle is in the fixture, m, and who is nearer than H: filled by `locate`
-  /// (surroundings.hpp) for rows that fail at a particle.
+  /// (neighborhood.hpp) for rows that fail at a particle.
   double worst_x = no_number, worst_y = no_number, worst_z = no_number;
   std::int64_t fluid_neighbors = -1, wall_neighbors = -1;
   std::string nearest;        // ids of the eight nearest fluid neighbors at most, nearest first
@@ -52,7 +52,7 @@ struct CheckRow {
   std::string reason;  // why not_run or fail; empty on a pass
   /// Per-particle |error| and tolerance (N, or 3N by component); kept whole for a failing check, as
   /// quantiles of the score for a passing one.
-  Eigen::VectorXd error, tolerances;
+  Eigen::VectorXd errors, tolerances;
   /// Score that `quantile_percent` % of the values do not exceed; empty until `condense`.
   std::vector<double> score_quantiles;
 };
@@ -64,7 +64,7 @@ inline constexpr std::array<int, 9> quantile_percent = {0, 1, 5, 25, 50, 75, 95,
 void condense(CheckRow& row);
 
 /// Fluid and wall particles around the worst particle of one row, as points to look at.
-struct Surroundings {
+struct Neighborhood {
   std::int64_t row = -1;                              // in the summary
   double spacing = 0, support_radius = 0;             // m
   Eigen::Matrix3Xd position;                          // 3×P, m, fluid first
@@ -78,15 +78,15 @@ struct Surroundings {
 struct Report {
   std::vector<CheckRow> rows;
   std::map<std::string, std::string> provenance;
-  std::optional<Surroundings> surroundings = std::nullopt;
+  std::optional<Neighborhood> neighborhood = std::nullopt;
 };
 
 /// The verdict as every consumer must read it: a pass stands only where 0 <= score <= 1 and value
 /// and tolerance are numbers, otherwise it is a fail.
-Verdict judged_verdict(const CheckRow& row);
+Verdict verdict_of(const CheckRow& row);
 
 /// The row's reason, or why its verdict of pass does not stand.
-std::string judged_reason(const CheckRow& row);
+std::string reason_of(const CheckRow& row);
 
 /// Whether the row has its per-particle errors and their tolerances.
 bool has_arrays(const CheckRow& row);

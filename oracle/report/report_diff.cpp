@@ -37,7 +37,7 @@ struct Keyed {
 };
 
 int badness(const CheckRow& row) {
-  const Verdict verdict = judged_verdict(row);
+  const Verdict verdict = verdict_of(row);
   return verdict == Verdict::pass ? 0 : verdict == Verdict::not_run ? 1 : 2;
 }
 
@@ -72,12 +72,11 @@ std::string missing_text(const char* title, const std::vector<CheckRow>& rows) {
   std::string text;
   for (const auto& [name, group] : groups) {
     const auto passing = std::count_if(group.begin(), group.end(),
-                                       [](const CheckRow* row) { return judged_verdict(*row) == Verdict::pass; });
+                                       [](const CheckRow* row) { return verdict_of(*row) == Verdict::pass; });
     std::string line = fmt::format("{}: {} on {}: {} row{}, {} passing", title, name.first, name.second, group.size(),
                                    group.size() == 1 ? "" : "s", passing);
     if (group.size() <= 4)
-      for (const CheckRow* row : group)
-        line += fmt::format("; {} {}", check_label(*row), to_string(judged_verdict(*row)));
+      for (const CheckRow* row : group) line += fmt::format("; {} {}", check_label(*row), to_string(verdict_of(*row)));
     text += wrapped(line, 0);
   }
   return text;
@@ -86,11 +85,11 @@ std::string missing_text(const char* title, const std::vector<CheckRow>& rows) {
 std::string verdicts_text(const char* title, const std::vector<RowPair>& pairs) {
   std::string text;
   for (const auto& [before, after] : pairs) {
-    text += wrapped(fmt::format("{}: {} -> {}, score {:.3g} -> {:.3g}: {}", title, to_string(judged_verdict(before)),
-                                to_string(judged_verdict(after)), before.score, after.score, place_of(after)),
+    text += wrapped(fmt::format("{}: {} -> {}, score {:.3g} -> {:.3g}: {}", title, to_string(verdict_of(before)),
+                                to_string(verdict_of(after)), before.score, after.score, place_of(after)),
                     0);
     const std::string all = in_full(after);
-    if (judged_verdict(after) != Verdict::pass) text += all.substr(all.find("\n    ") + 1);
+    if (verdict_of(after) != Verdict::pass) text += all.substr(all.find("\n    ") + 1);
   }
   return text;
 }
@@ -112,7 +111,7 @@ std::string scores_text(const char* title, const std::vector<RowPair>& pairs) {
 
 bool ReportDiff::got_worse() const {
   return !worse.empty() || std::any_of(only_before.begin(), only_before.end(),
-                                       [](const auto& row) { return judged_verdict(row) == Verdict::pass; });
+                                       [](const auto& row) { return verdict_of(row) == Verdict::pass; });
 }
 
 ReportDiff difference(const Report& before, const Report& after, double factor) {

@@ -33,7 +33,7 @@ struct ReportDiff {
   bool got_worse() const;
 };
 
-/// Compares verdicts as judged_verdict reads them. A score that is 0 or no number on one side alone
+/// Compares verdicts as verdict_of reads them. A score that is 0 or no number on one side alone
 /// has moved beyond any factor. \param factor  >= 1
 ReportDiff difference(const Report& before, const Report& after, double factor = 2);
 

@@ -56,7 +56,7 @@ Eigen::VectorXd volume_tolerances(const Scene& scene, const WallNeighbors& neigh
 
 class Bounds {
  public:
-  Bounds(const Scene& scene, const Walls& walls, const WallAnswer& volumes, const ParticleState& state,
+  Bounds(const Scene& scene, const Walls& walls, const WallSolution& volumes, const ParticleState& state,
          const StageInputs* given)
       : scene_(scene),
         state_(state),
@@ -68,7 +68,7 @@ class Bounds {
         posed_(pose_walls(scene, walls, scene.time_at(state.substep))),
         pose_(pose_errors(scene, walls, posed_, scene.time_at(state.substep), u)),
         common_(scene.kernel) {
-    OracleAnswer& a = answer_;
+    ReferenceSolution& a = solution_;
     Neighbors near_H;
     find_neighbors_and_shell(scene, state.position, posed_.position, widest_margin(), near_, near_H);
     evaluate<double>(scene, state, posed_, volumes.volume, near_, a.fields, given);
@@ -82,7 +82,7 @@ class Bounds {
     accelerations();
   }
 
-  OracleAnswer take() { return std::move(answer_); }
+  ReferenceSolution take() { return std::move(solution_); }
 
  private:
   /// What the bounds of one particle are put together in; memory is kept from one to the next.
@@ -118,8 +118,8 @@ class Bounds {
     const double own = of_density_term + of_mass + common_.W;
     const double own_of_wall = of_density_term + of_wall_factors + common_.W;
     const auto n = state_.size();
-    const auto& V = answer_.fields.boundary_volume;
-    auto& C = answer_.condition;
+    const auto& V = solution_.fields.boundary_volume;
+    auto& C = solution_.condition;
     C.density.setZero(n);
     C.density_pose.setZero(n);
     tau_q_.setZero(n);
@@ -164,7 +164,7 @@ class Bounds {
         ambiguous_wall[i] += 6 * margin(e) / H_;
         if (r > 0) displaced += slope / r * x_ib.cwiseProduct(e);
         if (periodic_ && r > 0) add_images(x_i - x_b, x_ib, slope / r * e, images);
-        from_volumes += rho0 * answer_.tolerance.boundary_volume[b] * W;
+        from_volumes += rho0 * solution_.tolerance.boundary_volume[b] * W;
       }
       // A pair that fp32 may place inside H has a term no larger than that of its nearest place.
       double from_edge = 0;
@@ -172,12 +172,12 @@ class Bounds {
       for (const Edge& e : edge_wall_[static_cast<std::size_t>(i)]) from_edge += rho0 * V[e.id] * kernel_.W(e.r);
       C.density[i] = sum;
       C.density_pose[i] = pose;
-      answer_.tolerance.density[i] =
+      solution_.tolerance.density[i] =
           terms.error(u, u * (inside + std::abs(by_H)), scratch.cells) + misplaced + from_volumes + from_edge;
       pressure_bounds(i, displaced, from_volumes, images);
     });
-    answer_.most_fluid_ambiguous = static_cast<std::int64_t>(std::ceil(4 * ambiguous_fluid.sum())) + 10;
-    answer_.most_wall_ambiguous = static_cast<std::int64_t>(std::ceil(4 * ambiguous_wall.sum())) + 10;
+    solution_.most_fluid_ambiguous = static_cast<std::int64_t>(std::ceil(4 * ambiguous_fluid.sum())) + 10;
+    solution_.most_wall_ambiguous = static_cast<std::int64_t>(std::ceil(4 * ambiguous_wall.sum())) + 10;
   }
 
   /// Pressure follows from the backend's own density unless density is given.
@@ -188,17 +188,17 @@ class Bounds {
     const double gamma = fluid.eos_exponent, B = scene_.eos_stiffness(), c0 = fluid.sound_speed;
     const double rho0 = fluid.rest_density;
     const bool rho_given = given_ && given_->density.size();
-    const double rho = rho_given ? given_->density[i] : answer_.fields.density[i];
-    const double tau_rho = rho_given ? 0.0 : answer_.tolerance.density[i];
+    const double rho = rho_given ? given_->density[i] : solution_.fields.density[i];
+    const double tau_rho = rho_given ? 0.0 : solution_.tolerance.density[i];
     const double compression = rho / rho0, power = std::pow(compression, gamma);
     const double unclamped = B * (power - 1);
     const double off_rho0 = static_cast<double>(static_cast<float>(rho0)) == rho0 ? 0 : 1;
     double tau_p = c0 * c0 * std::pow(compression, gamma - 1) * tau_rho +
                    u * ((gamma * (2 + off_rho0) + 6) * B * power + 6 * std::abs(unclamped));
     if (!fluid.allow_tension && unclamped + tau_p < 0) tau_p = 0;
-    answer_.tolerance.pressure[i] = tau_p;
+    solution_.tolerance.pressure[i] = tau_p;
     const bool p_given = given_ && given_->pressure.size();
-    const double p = p_given ? given_->pressure[i] : answer_.fields.pressure[i];
+    const double p = p_given ? given_->pressure[i] : solution_.fields.pressure[i];
     if (p_given) tau_p = 0;
     tau_q_[i] = tau_p / (rho * rho) + 2 * std::abs(p) * tau_rho / (rho * rho * rho) + 4 * u * std::abs(p) / (rho * rho);
     if (tau_p == 0 || rho_given) return;
@@ -216,17 +216,17 @@ class Bounds {
 
   void accelerations() {
     const auto n = state_.size();
-    auto& C = answer_.condition;
-    auto& T = answer_.tolerance;
+    auto& C = solution_.condition;
+    auto& T = solution_.tolerance;
     for (auto* sum : {&C.pressure_acceleration, &C.viscous_acceleration, &C.wall_pressure_acceleration,
                       &C.wall_viscous_acceleration})
       sum->setZero(3, n);
-    rho_ = given_ && given_->density.size() ? given_->density : answer_.fields.density;
-    q_ = (given_ && given_->pressure.size() ? given_->pressure : answer_.fields.pressure).array() /
+    rho_ = given_ && given_->density.size() ? given_->density : solution_.fields.density;
+    q_ = (given_ && given_->pressure.size() ? given_->pressure : solution_.fields.pressure).array() /
          rho_.array().square();
     rho_off_.setZero(n);
     if (!(given_ && given_->density.size()))
-      rho_off_ = answer_.tolerance.density.array() / answer_.fields.density.array();
+      rho_off_ = solution_.tolerance.density.array() / solution_.fields.density.array();
     for_particles(n, [&](Eigen::Index i, Scratch& scratch) {
       auto& [terms, cells, pressure, viscous, wall_pressure, wall_viscous] = scratch;
       for (ForceBounds* part : {&pressure, &viscous, &wall_pressure, &wall_viscous}) part->clear();
@@ -300,7 +300,7 @@ class Bounds {
     const double rho0 = scene_.fluid.rest_density, mu_w = scene_.fluid.wall_viscosity;
     const double own = of_pressure_term + of_wall_factors;
     const double own_viscous = of_viscous_term + of_wall_factors;
-    const auto& V = answer_.fields.boundary_volume;
+    const auto& V = solution_.fields.boundary_volume;
     const Vec3 x_i = state_.position.col(i), v_i = state_.velocity.col(i);
     for (const auto b : ids) {
       const Vec3 x_b = posed_.position.col(b), x_ib = separation_(x_i, x_b);
@@ -308,7 +308,7 @@ class Bounds {
       const Vec3 x = x_ib.cwiseAbs();
       const Vec3 e = wall_error(b, x_i, x_b, x_ib);
       const double e_r = along(x_ib, r, e);
-      const double tau_V = answer_.tolerance.boundary_volume[b];
+      const double tau_V = solution_.tolerance.boundary_volume[b];
       const double A = rho0 * V[b] * std::abs(q_[i]);
       pressure.add(rho0 * V[b] * q_[i] * G * x_ib);
       pressure.condition += A * (G + r * dG) * x;
@@ -361,8 +361,8 @@ class Bounds {
     const auto n = static_cast<std::size_t>(state_.size());
     edge_fluid_.resize(n);
     edge_wall_.resize(n);
-    answer_.fluid_ambiguous.assign(n, false);
-    answer_.wall_ambiguous.assign(n, false);
+    solution_.fluid_ambiguous.assign(n, false);
+    solution_.wall_ambiguous.assign(n, false);
     const bool exact = exact_distances();
     for_particles(state_.size(), [&](Eigen::Index particle, Scratch&) {
       const auto i = static_cast<std::size_t>(particle);
@@ -381,8 +381,8 @@ class Bounds {
       }
     });
     for (std::size_t i = 0; i < n; ++i) {
-      answer_.fluid_ambiguous[i] = !edge_fluid_[i].empty();
-      answer_.wall_ambiguous[i] = !edge_wall_[i].empty();
+      solution_.fluid_ambiguous[i] = !edge_fluid_[i].empty();
+      solution_.wall_ambiguous[i] = !edge_wall_[i].empty();
     }
   }
 
@@ -405,36 +405,36 @@ class Bounds {
     double r;
   };
   std::vector<std::vector<Edge>> edge_fluid_, edge_wall_;
-  OracleAnswer answer_;
+  ReferenceSolution solution_;
 };
 
 }  // namespace
 
-WallAnswer wall_answer(const Scene& scene, const Walls& walls) {
+WallSolution wall_solution(const Scene& scene, const Walls& walls) {
   const WallNeighbors neighbors = find_wall_neighbors(scene, walls);
-  WallAnswer a;
+  WallSolution a;
   a.volume = boundary_volumes<double>(scene, neighbors);
   a.tolerance = volume_tolerances(scene, neighbors, a.volume);
-  a.float_volume = boundary_volumes<float>(scene, neighbors);
+  a.fp32_volume = boundary_volumes<float>(scene, neighbors);
   return a;
 }
 
-OracleAnswer answer(const Scene& scene, const Walls& walls, const WallAnswer& volumes, const ParticleState& state,
-                    const StageInputs* given) {
+ReferenceSolution reference_solution(const Scene& scene, const Walls& walls, const WallSolution& volumes,
+                                     const ParticleState& state, const StageInputs* given) {
   return Bounds(scene, walls, volumes, state, given).take();
 }
 
-OracleAnswer answer(const Scene& scene, const Walls& walls, const ParticleState& state) {
-  return answer(scene, walls, wall_answer(scene, walls), state);
+ReferenceSolution reference_solution(const Scene& scene, const Walls& walls, const ParticleState& state) {
+  return reference_solution(scene, walls, wall_solution(scene, walls), state);
 }
 
-Fields float_fields(const Scene& scene, const Walls& walls, const WallAnswer& volumes, const ParticleState& state,
-                    const StageInputs* given) {
+Fields fp32_reference_fields(const Scene& scene, const Walls& walls, const WallSolution& volumes,
+                             const ParticleState& state, const StageInputs* given) {
   const PosedWalls posed = pose_walls(scene, walls, scene.time_at(state.substep));
   Neighbors near;
   find_neighbors(scene, state.position, posed.position, NeighborSearch::cells, near);
   Fields fields;
-  evaluate<float>(scene, state, posed, volumes.float_volume, near, fields, given);
+  evaluate<float>(scene, state, posed, volumes.fp32_volume, near, fields, given);
   return fields;
 }
 

@@ -21,7 +21,7 @@ namespace decant {
 inline constexpr double unit_roundoff = 0x1p-24;
 
 /// The oracle's fields with the tolerance of each value, laid out alike (integers: 0).
-struct OracleAnswer {
+struct ReferenceSolution {
   Fields fields;
   ConditionSums condition;
   Fields tolerance;
@@ -33,10 +33,10 @@ struct OracleAnswer {
 
 /// What rigid walls keep whatever the fluid does, M, m³: V_b, tau(V_b) below, and V_b by the oracle's
 /// source in fp32.
-struct WallAnswer {
-  Eigen::VectorXd volume, tolerance, float_volume;
+struct WallSolution {
+  Eigen::VectorXd volume, tolerance, fp32_volume;
 };
-WallAnswer wall_answer(const Scene& scene, const Walls& walls);
+WallSolution wall_solution(const Scene& scene, const Walls& walls);
 
 /// Fields, condition sums and tolerances at one state. S(·) is the bound of a sum in any order with what
 /// happens inside its terms (sum_bound.hpp), e_b the error of a wall particle's place (pose_error.hpp), ê its
@@ -57,12 +57,12 @@ WallAnswer wall_answer(const Scene& scene, const Walls& walls);
 /// A pair that fp32 may find on the other side of H adds its term at the nearest place that fp32 may find,
 /// to each of them. With `given`, density and pressure are inputs, exact to both sides: their tolerances
 /// vanish from what follows; density alone is that of the equation of state.
-OracleAnswer answer(const Scene& scene, const Walls& walls, const WallAnswer& volumes, const ParticleState& state,
-                    const StageInputs* given = nullptr);
-OracleAnswer answer(const Scene& scene, const Walls& walls, const ParticleState& state);
+ReferenceSolution reference_solution(const Scene& scene, const Walls& walls, const WallSolution& volumes,
+                                     const ParticleState& state, const StageInputs* given = nullptr);
+ReferenceSolution reference_solution(const Scene& scene, const Walls& walls, const ParticleState& state);
 
 /// The oracle's own source in sequential fp32 on the same inputs: what plain single precision costs.
-Fields float_fields(const Scene& scene, const Walls& walls, const WallAnswer& volumes, const ParticleState& state,
-                    const StageInputs* given = nullptr);
+Fields fp32_reference_fields(const Scene& scene, const Walls& walls, const WallSolution& volumes,
+                             const ParticleState& state, const StageInputs* given = nullptr);
 
 }  // namespace decant

@@ -13,7 +13,7 @@
 namespace decant {
 namespace {
 
-/// In the child: "cases particles-found particles-shrunk tries property".
+/// In the child: "cases particles-found particles-minimised tries property".
 std::string campaign_text(const std::vector<std::string>& backends, Executor executor, std::int64_t most_cases,
                           std::uint64_t first_seed) {
   fuzz::Settings settings;
@@ -22,12 +22,13 @@ std::string campaign_text(const std::vector<std::string>& backends, Executor exe
     if (p.of_backend) settings.properties.insert(p.name);
   settings.first_seed = first_seed;
   settings.cases = most_cases;
-  settings.most_findings = 1;
+  settings.most_counterexamples = 1;
   const fuzz::Campaign c =
       fuzz::run_campaign(settings, [&](const std::string& choice) { return backend_of(choice, executor); });
-  if (c.findings.empty()) return fmt::format("{} 0 0 0 -", c.cases);
-  const fuzz::Finding& f = c.findings.front();
-  return fmt::format("{} {} {} {} {}", c.cases, f.found_particles, f.genome.points.size(), f.tries, f.outcome.property);
+  if (c.counterexamples.empty()) return fmt::format("{} 0 0 0 -", c.cases);
+  const fuzz::Counterexample& f = c.counterexamples.front();
+  return fmt::format("{} {} {} {} {}", c.cases, f.found_particles, f.fuzz_case.points.size(), f.tries,
+                     f.outcome.property);
 }
 
 /// The backend that a fault is planted for; all of them, and the options that it needs, where nobody knew.
@@ -57,16 +58,16 @@ std::string fuzz_faults(const nlohmann::json& faults, Executor executor, int job
   std::vector<long> cases;
   for (std::size_t k = 0; k < planted.size(); ++k) {
     char property[64] = "-";
-    long tried = 0, particles = 0, shrunk = 0, tries = 0;
-    const bool told =
-        std::sscanf(found[k].text.c_str(), "%ld %ld %ld %ld %63s", &tried, &particles, &shrunk, &tries, property) == 5;
+    long tried = 0, particles = 0, minimised = 0, tries = 0;
+    const bool told = std::sscanf(found[k].text.c_str(), "%ld %ld %ld %ld %63s", &tried, &particles, &minimised, &tries,
+                                  property) == 5;
     const bool hit = told ? property[0] != '-' : found[k].ended == "crash" || found[k].ended == "hang";
     count += hit;
     if (hit && told) cases.push_back(tried);
     table +=
         fmt::format("{:<26} {:<22} {:>8} {:>10} {:>8} {:>6}  {}; {}\n", planted[k]["name"].get<std::string>(),
                     planted[k].value("backend", "all"), told ? tried : 0, told && hit ? std::to_string(particles) : "-",
-                    told && hit ? std::to_string(shrunk) : "-", tries,
+                    told && hit ? std::to_string(minimised) : "-", tries,
                     !hit   ? "NOT FOUND"
                     : told ? property
                            : found[k].ended,

@@ -40,7 +40,7 @@ std::vector<Recording> small_fixtures(const std::filesystem::path& folder) {
 
 }  // namespace
 
-std::string judge_held_out(const nlohmann::json& faults, Executor executor, int jobs,
+std::string check_held_out(const nlohmann::json& faults, Executor executor, int jobs,
                            const std::filesystem::path& folder, const std::vector<std::string>& only,
                            bool& all_caught) {
   std::vector<nlohmann::json> planted;

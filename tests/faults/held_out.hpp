@@ -17,7 +17,7 @@ namespace decant {
 /// recording of `folder`, and then through the options that the fault needs, if it names any, until
 /// something fails. A fault marked `equivalent` must not be caught. Returns a table and a count.
 /// \param only  names; empty: all
-std::string judge_held_out(const nlohmann::json& faults, Executor executor, int jobs,
+std::string check_held_out(const nlohmann::json& faults, Executor executor, int jobs,
                            const std::filesystem::path& folder, const std::vector<std::string>& only, bool& all_caught);
 
 }  // namespace decant

@@ -189,7 +189,7 @@ int run(const Settings& s) {
   }
   if (!faults.empty() && faults[0].contains("shows")) {
     bool all_caught = false;
-    const std::string table = judge_held_out(faults, executor, s.jobs, s.folder, s.only, all_caught);
+    const std::string table = check_held_out(faults, executor, s.jobs, s.folder, s.only, all_caught);
     return finish(s, table, all_caught);
   }
   const bool mutations = !faults.empty() && !faults[0].contains("check");

@@ -29,7 +29,7 @@ void choose_fault(Executor executor, int number) {
 namespace {
 
 void say(const CheckRow& row, std::ostream& out) {
-  if (judged_verdict(row) == Verdict::pass) return;
+  if (verdict_of(row) == Verdict::pass) return;
   out << row.check << '\t' << row.field << '\t' << row.score << '\n';
 }
 
@@ -38,7 +38,7 @@ std::string failing_rows(const Trial& trial, Executor executor, const Prepared& 
   choose_fault(executor, trial.number);
   const auto backend = backend_of(trial.backend, executor);
   std::ostringstream out;
-  for (const CheckRow& row : judge(*backend, p.fixture, p.oracle, trial.checks)) say(row, out);
+  for (const CheckRow& row : run_checks(*backend, p.fixture, p.oracle, trial.checks)) say(row, out);
   return out.str();
 }
 
@@ -100,7 +100,7 @@ std::map<std::string, Prepared> prepare_all(const std::vector<Trial>& trials, co
   for (const Trial& t : trials) {
     if (prepared.count(t.fixture)) continue;
     Fixture fixture = read_fixture(folder / (t.fixture + ".h5"));
-    Judgement oracle = prepare(fixture);
+    PreparedReference oracle = prepare_reference(fixture);
     prepared.emplace(t.fixture, Prepared{std::move(fixture), std::move(oracle)});
   }
   return prepared;

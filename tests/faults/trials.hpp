@@ -34,7 +34,7 @@ struct Outcome {
 /// The fixtures' oracles, prepared before any process is split off.
 struct Prepared {
   Fixture fixture;
-  Judgement oracle;
+  PreparedReference oracle;
 };
 
 /// What plant.py says of a fault. Throws where it says nothing under that key.

@@ -46,19 +46,19 @@ std::string lines_of_forms(const std::vector<std::string>& fixtures, std::uint32
   const std::uint32_t seed = recorded ? k : first + k - static_cast<std::uint32_t>(fixtures.size());
   const Fixture fixture = recorded ? read_fixture(fixtures[k]) : test::random_form_case(seed);
   const Walls walls = sample_walls(fixture.scene);
-  const WallAnswer volumes = wall_answer(fixture.scene, walls);
-  const OracleAnswer own = answer(fixture.scene, walls, volumes, fixture.state);
+  const WallSolution volumes = wall_solution(fixture.scene, walls);
+  const ReferenceSolution own = reference_solution(fixture.scene, walls, volumes, fixture.state);
   StageInputs staged;
   staged.density = own.fields.density.cast<float>().cast<double>();
   staged.pressure = own.fields.pressure.cast<float>().cast<double>();
-  const OracleAnswer given = answer(fixture.scene, walls, volumes, fixture.state, &staged);
+  const ReferenceSolution given = reference_solution(fixture.scene, walls, volumes, fixture.state, &staged);
   std::mt19937 random(seed);
   std::string lines;
   for (int t = 0; t < tries; ++t) {
     const test::Forms forms = test::random_forms(random);
     std::string chosen;
     for (const auto& [name, value] : test::choices(forms)) chosen += fmt::format("{}: {}{}", name, value, separator);
-    const auto put = [&](const Fields& got, const OracleAnswer& oracle, const char* stage) {
+    const auto put = [&](const Fields& got, const ReferenceSolution& oracle, const char* stage) {
       for (const auto& [field, score] : test::scores(got, oracle)) {
         if (oracle.fields.density.size() == 0) continue;
         const bool once = field == "boundary_volume" || field == "density";

@@ -106,13 +106,13 @@ std::string judged_case(const Settings& s, Executor executor, std::uint32_t seed
   // A state that fp32 cannot judge at all is no case; `record` warns of those.
   if (!evaluate_oracle(fixture.scene, fixture.state, fixture.fields.emplace(), fixture.condition.emplace()).empty())
     return {};
-  const Judgement oracle = prepare(fixture, checks);
+  const PreparedReference oracle = prepare_reference(fixture, checks);
   std::string lines;
   for (const auto& name : s.backends)
-    for (CheckRow& row : judge(*make_backend(name, executor), fixture, oracle, checks)) {
+    for (CheckRow& row : run_checks(*make_backend(name, executor), fixture, oracle, checks)) {
       condense(row);
       lines += fmt::format("{} {} {} {} {} {} {} {}\n", row.check, row.field.empty() ? "-" : row.field, name, seed,
-                           row.n, row.score, row.median_score, to_string(judged_verdict(row)));
+                           row.n, row.score, row.median_score, to_string(verdict_of(row)));
     }
   return lines;
 }

@@ -2,6 +2,7 @@
 /// `decant bench`: what a substep costs each backend at recorded states. What does not conform is
 /// not timed.
 #include "oracle/checks/conform.hpp"
+#include "oracle/files/file_aside.hpp"
 #include "oracle/files/fixture_file.hpp"
 #include "oracle/report/console_table.hpp"
 #include "reference/error.hpp"
@@ -30,8 +31,9 @@ namespace {
 
 struct BenchArguments {
   BackendFlags flags;
-  std::vector<std::string> fixtures, backends;
-  std::string executor = "auto", json, report;
+  std::vector<std::string> fixtures, backends, reports;
+  std::string executor = "auto";
+  bool json = false;
   int substeps = 0, windows = 5, refine = 0;
 };
 
@@ -48,7 +50,8 @@ constexpr const char* footer =
     "77 the device of --executor is absent, 130 after Ctrl-C (143: SIGTERM): what was timed by then is kept.\n"
     "\n"
     "Examples:\n"
-    "  decant bench --backend brute,hash,list --executor cuda --json build/bench.json\n"
+    "  decant bench --backend brute,hash,list --executor cuda \\\n"
+    "    --report build/bench.json\n"
     "  decant bench pour-4k-stream --backend hash,hash:sort=thrust,list:skin=0.1";
 
 // Seconds that a window takes, about, where --substeps leaves it open.
@@ -140,9 +143,9 @@ double each_us(const StageTimes::Stage& stage) {
 CheckSelection timed_checks() { return {"fields", "substep"}; }
 
 /// Why the backend must not be timed; empty where it conforms.
-std::string objection(Backend& backend, const Fixture& fixture, const Judgement& oracle) {
-  for (const CheckRow& row : judge(backend, fixture, oracle, timed_checks()))
-    if (judged_verdict(row) != Verdict::pass)
+std::string objection(Backend& backend, const Fixture& fixture, const PreparedReference& oracle) {
+  for (const CheckRow& row : run_checks(backend, fixture, oracle, timed_checks()))
+    if (verdict_of(row) != Verdict::pass)
       return fmt::format("{} {} of {}: {}", row.check, row.field, fixture.name,
                          row.reason.empty() ? fmt::format("score {:.3g}", row.score) : row.reason);
   return {};
@@ -193,8 +196,7 @@ BenchRow time_backend(Backend& backend, const Fixture& fixture, const Walls& wal
 }
 
 int bench(BenchArguments& arguments) {
-  check_output_place("--json", arguments.json);
-  check_output_place("--report", arguments.report);
+  for (const std::string& report : arguments.reports) check_output_place("--report", report);
   std::vector<std::unique_ptr<Backend>> backends;
   auto names = arguments.backends;
   if (names.empty()) {
@@ -212,22 +214,27 @@ int bench(BenchArguments& arguments) {
   std::int64_t done = 0;
   const auto all = static_cast<std::int64_t>(files.size() * backends.size());
   const auto write = [&](const std::string& interrupted) {
-    if (!arguments.json.empty()) write_bench_json(arguments.json, rows, interrupted);
-    if (!arguments.report.empty()) write_bench_hdf5(arguments.report, rows, interrupted);
+    if (arguments.json) fmt::print("{}", bench_json(rows, interrupted));
+    std::fflush(stdout);
+    for (const std::string& report : arguments.reports)
+      if (report.ends_with(".json")) write_text_file(report, bench_json(rows, interrupted));
+      else write_bench_hdf5(report, rows, interrupted);
+  };
+  const auto tell = [&](const std::string& line) {
+    fmt::print(arguments.json ? stderr : stdout, "{}\n", line);
+    std::fflush(stdout);
   };
   Interruptible work([&] {
     const std::string line = interrupted_line(done, all, "timed or refused");
-    fmt::print("{}\n", line);
-    std::fflush(stdout);
+    tell(line);
     write(line);
   });
-  fmt::print("{}\n", bench_heading());
-  std::fflush(stdout);
+  tell(bench_heading());
   int status = exit_pass;
   for (const auto& file : files) {
     const Fixture fixture = read_fixture(file);
-    Judgement oracle;
-    work.part([&] { oracle = prepare(fixture, timed_checks()); });
+    PreparedReference oracle;
+    work.part([&] { oracle = prepare_reference(fixture, timed_checks()); });
     std::optional<Fixture> fine;  // made by the first backend that conforms, timed by all
     Walls fine_walls;
     for (const auto& backend : backends) {
@@ -236,7 +243,7 @@ int bench(BenchArguments& arguments) {
       std::string why;
       work.part([&] { why = objection(*backend, fixture, oracle); });
       if (!why.empty()) {
-        fmt::print("{:<28} does not conform, is not timed: {}\n", label, why);
+        tell(fmt::format("{:<28} does not conform, is not timed: {}", label, why));
         status = exit_does_not_conform;
         ++done;
         continue;
@@ -253,14 +260,13 @@ int bench(BenchArguments& arguments) {
         });
         rows.push_back(std::move(row));
       } catch (const BackendError& error) {
-        fmt::print("{:<28} breaks down, is not timed: {}\n", label, error.what());
+        tell(fmt::format("{:<28} breaks down, is not timed: {}", label, error.what()));
         status = exit_failure;
         ++done;
         continue;
       }
       ++done;
-      fmt::print("{}\n", to_text(rows.back()));
-      std::fflush(stdout);
+      tell(to_text(rows.back()));
     }
   }
   write("");
@@ -287,8 +293,9 @@ void add_bench_command(CLI::App& app, int& exit_status) {
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   verb->add_option("--refine", arguments->refine, "eight particles for one, so many times")->check(CLI::Range(0, 4));
-  verb->add_option("--json", arguments->json, "write rows as JSON");
-  verb->add_option("--report", arguments->report, "write rows as HDF5");
+  verb->add_flag("--json", arguments->json, "rows as JSON instead of the table");
+  verb->add_option("--report", arguments->reports, "write rows: as JSON where the name ends in .json, else as HDF5")
+      ->allow_extra_args(false);
   verb->callback([arguments, &exit_status] { exit_status = bench(*arguments); });
 }
 

@@ -69,13 +69,13 @@ std::string to_text(const BenchRow& row) {
       row.device_bytes_per_particle > 0 ? fmt::format("{:.0f}", row.device_bytes_per_particle) : "-", stages);
 }
 
-void write_bench_json(const std::string& file, const std::vector<BenchRow>& rows, const std::string& interrupted) {
+std::string bench_json(const std::vector<BenchRow>& rows, const std::string& interrupted) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array(), made_by;
   for (const BenchRow& row : rows) list.push_back(to_json(row));
   for (const auto& [key, value] : provenance()) made_by[key] = value;
   nlohmann::ordered_json all = {{"decant_bench", 1}, {"rows", list}, {"provenance", made_by}};
   if (!interrupted.empty()) all["interrupted"] = interrupted;
-  write_text_file(file, all.dump(2) + '\n');
+  return all.dump(2) + '\n';
 }
 
 void write_bench_hdf5(const std::string& file, const std::vector<BenchRow>& rows, const std::string& interrupted) {

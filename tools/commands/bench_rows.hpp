@@ -35,9 +35,11 @@ std::string backend_label(const std::string& name, const std::string& options);
 std::string bench_heading();
 std::string to_text(const BenchRow& row);
 
-/// Both appear whole or not at all and hold this build's provenance. Throws std::runtime_error naming
-/// the file where it cannot be written.
-void write_bench_json(const std::string& file, const std::vector<BenchRow>& rows, const std::string& interrupted = {});
+/// Rows and this build's provenance as JSON text.
+std::string bench_json(const std::vector<BenchRow>& rows, const std::string& interrupted = {});
+
+/// Appears whole or not at all and holds this build's provenance. Throws std::runtime_error naming the file where it
+/// cannot be written.
 /// Columns of equal length in /rows, units as attributes.
 void write_bench_hdf5(const std::string& file, const std::vector<BenchRow>& rows, const std::string& interrupted = {});
 

@@ -2,20 +2,20 @@
 /// `decant conform`: every asked-for backend on every asked-for fixture, a table, a report, a
 /// status.
 #include "oracle/checks/conform.hpp"
-#include "oracle/checks/surroundings.hpp"
+#include "oracle/checks/neighborhood.hpp"
 #include "oracle/files/file_aside.hpp"
 #include "oracle/files/fixture_file.hpp"
 #include "oracle/files/report_file.hpp"
 #include "oracle/report/console_table.hpp"
 #include "reference/error.hpp"
 #include "tools/commands/backend_choice.hpp"
+#include "tools/commands/check_results_file.hpp"
 #include "tools/commands/commands.hpp"
 #include "tools/commands/fixture_folder.hpp"
 #include "tools/commands/interruptible.hpp"
 #include "tools/commands/junit.hpp"
 #include "tools/commands/output_place.hpp"
-#include "tools/commands/replay.hpp"
-#include "tools/commands/results_judgement.hpp"
+#include "tools/commands/reproducers.hpp"
 #include "tools/common/build_provenance.hpp"
 #include "tools/common/progress.hpp"
 
@@ -23,10 +23,12 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <chrono>
 #include <future>
 #include <memory>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace decant {
@@ -35,10 +37,10 @@ namespace {
 struct ConformArguments {
   BackendFlags flags;
   std::vector<std::string> fixtures, backends, checks;
-  std::string executor = "auto", report, junit, surroundings, explain;
-  std::string results, oracle, name;
-  int look_every = 0;
-  bool all = false, list = false, json = false, quiet = false;
+  std::string executor = "auto", report, junit, neighborhood, explain;
+  std::string results, oracle, name, select;
+  int sample_every = 0, durations = 0;
+  bool all = false, list = false, json = false, quiet = false, exit_first = false;
 };
 
 // Of what a report shows around its first failing particle, in H.
@@ -109,6 +111,13 @@ std::vector<Fixture> fixtures_of(const ConformArguments& arguments) {
   for (const auto& given : arguments.fixtures) files.push_back(recording_called(given));
   if (!files.empty() && arguments.all) throw InputError("command line", "--all", "given", "either --all or FIXTURE");
   if (files.empty()) files = fixtures_in(fixture_folder(), arguments.all);
+  if (!arguments.select.empty()) {
+    std::erase_if(files,
+                  [&](const auto& file) { return file.stem().string().find(arguments.select) == std::string::npos; });
+    if (files.empty())
+      throw InputError("command line", "--select", arguments.select,
+                       "part of a recording's name (decant conform --list)");
+  }
   std::vector<Fixture> fixtures;
   for (const auto& file : files) fixtures.push_back(read_fixture(file));
   return fixtures;
@@ -125,23 +134,27 @@ CheckRow row_that_did_not_run(const Candidate& candidate, const Fixture& fixture
   return row;
 }
 
-/// Adds the rows of all, pair by pair. \param judged  pairs of backend and fixture whose rows are there
-void judge_all(std::vector<Candidate>& candidates, const std::vector<Fixture>& fixtures, const CheckSelection& checks,
-               int look_every, bool quiet, Interruptible& work, Report& report, std::int64_t& judged) {
+/// Adds the rows of all, pair by pair, until one fails where that is asked for. \param judged  pairs of backend and
+/// fixture whose rows are there; \param seconds  what each took, by its name
+void check_all(std::vector<Candidate>& candidates, const std::vector<Fixture>& fixtures, const CheckSelection& checks,
+               const ConformArguments& arguments, bool quiet, Interruptible& work, Report& report, std::int64_t& judged,
+               std::vector<std::pair<double, std::string>>& seconds) {
+  using Clock = std::chrono::steady_clock;
   const auto total = static_cast<std::int64_t>(candidates.size() * fixtures.size());
   const bool any =
       std::any_of(candidates.begin(), candidates.end(), [](const Candidate& c) { return c.backend != nullptr; });
-  Progress progress("judgement", total, 0, quiet);
+  Progress progress("check", total, 0, quiet);
   // The oracle is sequential: it works on the next fixture while backends are judged on this one.
   const auto prepared = [&](std::size_t k) {
-    return std::async(std::launch::async,
-                      [&, k] { return std::make_unique<const Judgement>(prepare(fixtures[k], checks, look_every)); });
+    return std::async(std::launch::async, [&, k] {
+      return std::make_unique<const PreparedReference>(prepare_reference(fixtures[k], checks, arguments.sample_every));
+    });
   };
-  std::future<std::unique_ptr<const Judgement>> next;
+  std::future<std::unique_ptr<const PreparedReference>> next;
   if (any && !fixtures.empty()) next = prepared(0);
   for (std::size_t k = 0; k < fixtures.size(); ++k) {
     const Fixture& fixture = fixtures[k];
-    std::unique_ptr<const Judgement> oracle;
+    std::unique_ptr<const PreparedReference> oracle;
     if (any) work.part([&] { oracle = next.get(); });
     if (any && k + 1 < fixtures.size()) next = prepared(k + 1);
     for (Candidate& candidate : candidates) {
@@ -152,30 +165,45 @@ void judge_all(std::vector<Candidate>& candidates, const std::vector<Fixture>& f
         continue;
       }
       std::vector<CheckRow> rows;
+      const auto start = Clock::now();
       work.part([&] {
-        rows = judge(*candidate.backend, fixture, *oracle, checks);
+        rows = run_checks(*candidate.backend, fixture, *oracle, checks);
         for (CheckRow& row : rows) condense(row);
       });
+      seconds.emplace_back(std::chrono::duration<double>(Clock::now() - start).count(),
+                           candidate.info.name + " " + fixture.name);
+      bool fails = false;
       for (CheckRow& row : rows) {
-        if (!report.surroundings && is_located(row))
-          report.surroundings = surroundings_of(fixture, oracle->walls, oracle->own.fields.density, row,
+        fails |= verdict_of(row) == Verdict::fail;
+        if (!report.neighborhood && is_located(row))
+          report.neighborhood = neighborhood_of(fixture, oracle->walls, oracle->own.fields.density, row,
                                                 static_cast<std::int64_t>(report.rows.size()),
                                                 shown_radius * fixture.scene.support_radius());
         report.rows.push_back(std::move(row));
       }
       ++judged;
+      if (fails && arguments.exit_first) return;
     }
   }
   progress.update(total);
 }
 
+/// The slowest pairs of backend and fixture, one per line.
+std::string slowest(std::vector<std::pair<double, std::string>> seconds, int most) {
+  std::sort(seconds.rbegin(), seconds.rend());
+  std::string text;
+  for (std::size_t k = 0; k < seconds.size() && k < static_cast<std::size_t>(most); ++k)
+    text += fmt::format("{:8.2f} s  {}\n", seconds[k].first, seconds[k].second);
+  return text.empty() ? text : "\nslowest, without the reference\n" + text;
+}
+
 /// What was asked for and is not there is in the report too.
 void add_what_was_not_judged(const std::vector<Candidate>& candidates, const std::vector<Fixture>& fixtures,
-                             std::int64_t judged, Report& report) {
+                             std::int64_t judged, const std::string& why, Report& report) {
   std::int64_t pair = 0;
   for (const Fixture& fixture : fixtures)
     for (const Candidate& candidate : candidates)
-      if (pair++ >= judged) report.rows.push_back(row_that_did_not_run(candidate, fixture, "interrupted"));
+      if (pair++ >= judged) report.rows.push_back(row_that_did_not_run(candidate, fixture, why));
 }
 
 void add_provenance(Report& report, const std::vector<Candidate>& candidates, const std::vector<Fixture>& fixtures) {
@@ -196,7 +224,8 @@ int status_of(const Report& report, const std::vector<Candidate>& candidates) {
   return status == exit_failure && absent && only_the_device ? exit_device_absent : status;
 }
 
-std::string json_text(const Report& report, const std::vector<Replay>& replays, const std::string& line, int status) {
+std::string json_text(const Report& report, const std::vector<ReproducerFile>& reproducers, const std::string& line,
+                      int status) {
   nlohmann::ordered_json rows = nlohmann::ordered_json::array(), files = rows;
   for (const auto& r : report.rows)
     rows.push_back({{"backend", r.backend},
@@ -208,27 +237,28 @@ std::string json_text(const Report& report, const std::vector<Replay>& replays, 
                     {"field", r.field},
                     {"unit", r.unit},
                     {"n", r.n},
-                    {"value", r.value},
+                    {"error", r.error},
                     {"tolerance", r.tolerance},
                     {"score", r.score},
                     {"median_score", r.median_score},
-                    {"float_score", r.float_score},
+                    {"fp32_reference_score", r.fp32_reference_score},
                     {"worst_id", r.worst_id},
                     {"worst_component", r.worst_component},
-                    {"got", r.got},
+                    {"actual", r.actual},
                     {"expected", r.expected},
                     {"worst_position", {r.worst_x, r.worst_y, r.worst_z}},
                     {"fluid_neighbors", r.fluid_neighbors},
                     {"wall_neighbors", r.wall_neighbors},
                     {"nearest", r.nearest},
                     {"excluded", r.excluded},
-                    {"verdict", to_string(judged_verdict(r))},
-                    {"reason", judged_reason(r)}});
-  for (const auto& replay : replays) files.push_back({{"row", replay.row}, {"file", replay.file.string()}});
+                    {"verdict", to_string(verdict_of(r))},
+                    {"reason", reason_of(r)}});
+  for (const auto& reproducer : reproducers)
+    files.push_back({{"row", reproducer.row}, {"file", reproducer.file.string()}});
   const nlohmann::ordered_json all = {{"summary", line},
                                       {"exit_status", status},
                                       {"rows", rows},
-                                      {"surroundings", files},
+                                      {"reproducers", files},
                                       {"provenance", report.provenance}};
   return all.dump(2);
 }
@@ -254,24 +284,24 @@ int explain(const std::string& name) {
   return exit_pass;
 }
 
-void write_replays(const std::vector<Replay>& replays, const Report& report, const std::vector<Fixture>& fixtures,
-                   bool talks) {
-  for (const Replay& replay : replays) {
-    const CheckRow& row = report.rows[replay.row];
+void write_reproducers(const std::vector<ReproducerFile>& reproducers, const Report& report,
+                       const std::vector<Fixture>& fixtures, bool talks) {
+  for (const ReproducerFile& reproducer : reproducers) {
+    const CheckRow& row = report.rows[reproducer.row];
     const auto fixture =
         std::find_if(fixtures.begin(), fixtures.end(), [&](const Fixture& f) { return f.name == row.fixture; });
-    std::filesystem::create_directories(replay.file.parent_path());
+    std::filesystem::create_directories(reproducer.file.parent_path());
     std::string warning;
-    const std::string line = write_replay(replay.file, *fixture, row, warning);
+    const std::string line = write_reproducer(reproducer.file, *fixture, row, warning);
     if (talks) fmt::print("{}\n", line);
-    if (!warning.empty()) fmt::print(stderr, "warning: {}: {}\n", replay.file.string(), warning);
+    if (!warning.empty()) fmt::print(stderr, "warning: {}: {}\n", reproducer.file.string(), warning);
   }
 }
 
 /// Prints what was asked for and writes the report.
-int hand_over(const ConformArguments& arguments, const Report& report, const std::vector<Replay>& replays, int status,
-              const std::string& table, const std::string& line) {
-  if (arguments.json) fmt::print("{}\n", json_text(report, replays, line, status));
+int hand_over(const ConformArguments& arguments, const Report& report, const std::vector<ReproducerFile>& reproducers,
+              int status, const std::string& table, const std::string& line) {
+  if (arguments.json) fmt::print("{}\n", json_text(report, reproducers, line, status));
   else if (arguments.quiet) fmt::print("{}\n", line);
   else fmt::print("{}", table);
   std::fflush(stdout);
@@ -286,16 +316,26 @@ int hand_over(const ConformArguments& arguments, const Report& report, const std
 int conform_results(const ConformArguments& arguments) {
   if (arguments.results.empty())
     throw InputError("command line", "--results", "not given", "required with --oracle and --name");
-  if (!arguments.backends.empty() || arguments.all || arguments.executor != "auto")
+  if (!arguments.backends.empty() || arguments.all || arguments.executor != "auto" || !arguments.select.empty() ||
+      arguments.exit_first || arguments.durations > 0)
     throw InputError("command line", "--results", arguments.results,
-                     "instead of --backend, --executor and --all: nothing is run");
-  if (!arguments.surroundings.empty())
-    throw InputError("command line", "--reproducers", arguments.surroundings, "not with --results");
+                     "instead of --backend, --executor, --all, --select, --exitfirst and --durations: nothing is run");
+  if (!arguments.neighborhood.empty() && !arguments.oracle.empty())
+    throw InputError("command line", "--reproducers", arguments.neighborhood,
+                     "not with --oracle: a reproducer is cut out of a recording");
   arguments.flags.require_used();
   check_output_place("--report", arguments.report);
+  check_output_folder("--reproducers", arguments.neighborhood);
+  std::vector<std::string> files;
+  for (const auto& given : arguments.fixtures) files.push_back(recording_called(given).string());
   const ResultsOutcome outcome =
-      judge_results_file({arguments.results, arguments.fixtures, arguments.oracle, arguments.name, arguments.checks});
-  return hand_over(arguments, outcome.report, {}, outcome.status, outcome.table, outcome.line);
+      check_results_file({arguments.results, files, arguments.oracle, arguments.name, arguments.checks});
+  std::vector<ReproducerFile> reproducers;
+  if (!arguments.neighborhood.empty()) reproducers = reproducers_of(outcome.report, arguments.neighborhood);
+  hand_over(arguments, outcome.report, reproducers, outcome.status, outcome.table, outcome.line);
+  if (!reproducers.empty())
+    write_reproducers(reproducers, outcome.report, {read_fixture(files.front())}, !arguments.quiet && !arguments.json);
+  return outcome.status;
 }
 
 int conform(ConformArguments& arguments) {
@@ -306,19 +346,19 @@ int conform(ConformArguments& arguments) {
   const CheckSelection checks = arguments.checks.empty() ? all_checks() : parse_checks(arguments.checks);
   check_output_place("--report", arguments.report);
   check_output_place("--junit", arguments.junit);
-  check_output_folder("--reproducers", arguments.surroundings);
+  check_output_folder("--reproducers", arguments.neighborhood);
   auto candidates = candidates_of(arguments);
   const auto fixtures = fixtures_of(arguments);
   const bool talks = !arguments.quiet && !arguments.json;
   Report report;
   std::int64_t judged = 0;
-  const auto hand_over_all = [&](int status, const std::vector<Replay>& replays, const std::string& more) {
+  const auto hand_over_all = [&](int status, const std::vector<ReproducerFile>& reproducers, const std::string& more) {
     add_provenance(report, candidates, fixtures);
-    hand_over(arguments, report, replays, status, "\n" + console_table(report) + more,
+    hand_over(arguments, report, reproducers, status, "\n" + console_table(report) + more,
               verdict_line(report) + (more.empty() ? "" : "\n" + more.substr(0, more.size() - 1)));
   };
   Interruptible work([&] {
-    add_what_was_not_judged(candidates, fixtures, judged, report);
+    add_what_was_not_judged(candidates, fixtures, judged, "interrupted", report);
     const auto all = static_cast<std::int64_t>(candidates.size() * fixtures.size());
     const std::string line = interrupted_line(judged, all, "judged");
     report.provenance["interrupted"] = line;
@@ -330,12 +370,15 @@ int conform(ConformArguments& arguments) {
       fmt::print("{}: {}\n", c.info.name,
                  c.backend ? fmt::format("{} on {}", c.info.executor, c.info.device) : c.why_not);
   std::fflush(stdout);
-  judge_all(candidates, fixtures, checks, arguments.look_every, !talks, work, report, judged);
+  std::vector<std::pair<double, std::string>> seconds;
+  check_all(candidates, fixtures, checks, arguments, !talks, work, report, judged, seconds);
+  add_what_was_not_judged(candidates, fixtures, judged, "after the first failure (--exitfirst)", report);
   const int status = status_of(report, candidates);
-  std::vector<Replay> replays;
-  if (!arguments.surroundings.empty()) replays = replays_of(report, arguments.surroundings);
-  hand_over_all(status, replays, "");
-  write_replays(replays, report, fixtures, talks);
+  std::vector<ReproducerFile> reproducers;
+  if (!arguments.neighborhood.empty()) reproducers = reproducers_of(report, arguments.neighborhood);
+  hand_over_all(status, reproducers, "");
+  if (talks) fmt::print("{}", slowest(seconds, arguments.durations));
+  write_reproducers(reproducers, report, fixtures, talks);
   return status;
 }
 
@@ -347,6 +390,10 @@ void add_conform_command(CLI::App& app, int& exit_status) {
   verb->footer(footer);
   verb->add_option("FIXTURE", arguments->fixtures, "recordings, by file or by name; default: the small ones");
   verb->add_flag("--all", arguments->all, "the study-scale recordings too");
+  verb->add_option("-k,--select", arguments->select, "of the recordings those with this in their names");
+  verb->add_flag("-x,--exitfirst", arguments->exit_first, "stop after the first recording and backend that fail");
+  verb->add_option("--durations", arguments->durations, "print the so many slowest pairs of backend and recording")
+      ->check(CLI::Range(1, 10000));
   verb->add_flag("--list", arguments->list, "print the names of all recordings; judges nothing");
   verb->add_option("--backend", arguments->backends, "brute,…; default: all under test")
       ->delimiter(',')
@@ -362,15 +409,15 @@ void add_conform_command(CLI::App& app, int& exit_status) {
                    "judge this file's fields (oracle/formats/results.md) instead of a backend");
   verb->add_option("--oracle", arguments->oracle, "their own reference, for --results of their own states");
   verb->add_option("--name", arguments->name, "what the report calls --results; default: its file");
-  verb->add_option("--check-every", arguments->look_every,
+  verb->add_option("--check-every", arguments->sample_every,
                    "check mass and containment every so many substeps of a run; 1 names the first "
                    "substep; default: at ever shorter intervals")
       ->check(CLI::Range(1, 1000000));
-  verb->add_option("--look-every", arguments->look_every)->check(CLI::Range(1, 1000000))->group("");
+  verb->add_option("--look-every", arguments->sample_every)->check(CLI::Range(1, 1000000))->group("");
   verb->add_option("--report", arguments->report, "write an HDF5 report");
   verb->add_option("--junit", arguments->junit, "write JUnit XML, for CI");
-  verb->add_option("--surroundings", arguments->surroundings)->group("");
-  verb->add_option("--reproducers", arguments->surroundings,
+  verb->add_option("--surroundings", arguments->neighborhood)->group("");
+  verb->add_option("--reproducers", arguments->neighborhood,
                    "folder for fixtures of the fluid around failing particles");
   verb->add_flag("--json", arguments->json, "rows as JSON instead of the table");
   verb->add_flag("--quiet", arguments->quiet, "the verdict's line alone");

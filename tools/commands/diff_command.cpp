@@ -47,12 +47,12 @@ nlohmann::ordered_json named(const CheckRow& row) {
 }
 
 nlohmann::ordered_json figures(const CheckRow& row) {
-  return {{"verdict", to_string(judged_verdict(row))},
+  return {{"verdict", to_string(verdict_of(row))},
           {"score", row.score},
-          {"value", row.value},
+          {"error", row.error},
           {"tolerance", row.tolerance},
           {"worst_id", row.worst_id},
-          {"reason", judged_reason(row)}};
+          {"reason", reason_of(row)}};
 }
 
 nlohmann::ordered_json pairs_json(const std::vector<RowPair>& pairs) {

@@ -29,7 +29,7 @@ struct DriftArguments {
   std::vector<std::string> inputs;
   std::vector<int> intervals = {1, 2, 5, 10, 20, 50};
   std::vector<double> skins = {0, 0.05, 0.1, 0.2};
-  int window = 50, looks = 64;
+  int window = 50, samples = 64;
   std::string backend = "list", executor = "auto", report, series;
   bool recommend = false, untimed = false, whole = false, quiet = false;
   double tolerance = 1e-3;
@@ -83,8 +83,8 @@ void check(DriftArguments& arguments) {
     if (!(s >= 0 && s <= 1)) refuse("--skins", fmt::format("{}", s), "0 to 1, shares of H");
   if (arguments.window < 2 || arguments.window > 1000)
     refuse("--window", std::to_string(arguments.window), "2 to 1000 substeps");
-  if (arguments.looks < 1 || arguments.looks > 100'000)
-    refuse("--samples", std::to_string(arguments.looks), "1 to 100000");
+  if (arguments.samples < 1 || arguments.samples > 100'000)
+    refuse("--samples", std::to_string(arguments.samples), "1 to 100000");
   if (!(arguments.tolerance > 0)) refuse("--tolerance", fmt::format("{}", arguments.tolerance), "> 0");
   if (arguments.recommend && arguments.untimed) refuse("--recommend", "given", "without --untimed: it compares times");
   if (arguments.backend != "list") refuse("--backend", arguments.backend, "list, which alone keeps lists");
@@ -187,7 +187,7 @@ void run(DriftArguments& arguments, int& exit_status) {
     progress.update(0, scene.name);
     std::vector<Fixture> phases = phases_of(scene);
     PourDrift pour;
-    work.part([&] { pour = along_pour(scene, plan, arguments.looks, make_list, phases); });
+    work.part([&] { pour = along_pour(scene, plan, arguments.samples, make_list, phases); });
     pours.push_back(std::move(pour));
     for (Fixture& phase : phases) states.push_back(std::move(phase));
     if (arguments.whole)
@@ -206,7 +206,11 @@ void run(DriftArguments& arguments, int& exit_status) {
     for (const Fixture& state : states) {
       progress.update(static_cast<std::int64_t>(results.size()), state.name);
       DriftResult result;
-      work.part([&] { result = measure_drift(state, plan, make_list); });
+      work.part([&] {
+        result = measure_drift(state, plan, make_list, [&](double part) {
+          progress.update(static_cast<std::int64_t>(results.size()), state.name, part);
+        });
+      });
       results.push_back(std::move(result));
     }
     progress.update(static_cast<std::int64_t>(results.size()));
@@ -239,9 +243,9 @@ void add_drift_command(CLI::App& app, int& exit_status) {
   verb.add_flag("--recommend", arguments->recommend, "names an interval and a skin");
   verb.add_option("--tolerance", arguments->tolerance, "of the acceleration, relative RMS, for --recommend")
       ->capture_default_str();
-  verb.add_option("--samples", arguments->looks, "moments of a scene at which lists are compared")
+  verb.add_option("--samples", arguments->samples, "moments of a scene at which lists are compared")
       ->capture_default_str();
-  verb.add_option("--looks", arguments->looks)->group("");
+  verb.add_option("--looks", arguments->samples)->group("");
   verb.add_option("--series", arguments->series,
                   "HDF5 with another program's states and lists (oracle/formats/list-series.md)");
   verb.add_flag("--full-run", arguments->whole, "of a scene: pours it from end to end with every list");

@@ -24,7 +24,7 @@ struct FuzzArguments {
   std::uint64_t seed = 1;
   std::int64_t cases = -1;
   double seconds = 0;
-  int threads = 0, most_findings = 16;
+  int threads = 0, most_counterexamples = 16;
   bool no_shrink = false, quiet = false, write = false;
 };
 
@@ -64,7 +64,7 @@ std::set<std::string> chosen(const std::vector<std::string>& given) {
 void run(FuzzArguments& arguments, int& exit_status) {
   if (arguments.write) {
     const std::string seed = fmt::format("{}", arguments.seed);
-    fmt::print("decant conform {}\n", fuzz::write_problem(arguments.failures, fuzz::random_genome(arguments.seed),
+    fmt::print("decant conform {}\n", fuzz::write_problem(arguments.failures, fuzz::random_case(arguments.seed),
                                                           "fuzz-" + seed, {{"fuzz_seed", seed}}));
     return;
   }
@@ -84,8 +84,8 @@ void run(FuzzArguments& arguments, int& exit_status) {
   settings.seconds = arguments.seconds;
   settings.threads =
       arguments.threads > 0 ? arguments.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  settings.most_findings = arguments.most_findings;
-  settings.shrink_tries = arguments.no_shrink ? 0 : 2000;
+  settings.most_counterexamples = arguments.most_counterexamples;
+  settings.minimise_tries = arguments.no_shrink ? 0 : 2000;
   settings.failures = arguments.failures;
   const StopSignal signal;
   settings.stop = [] { return StopSignal::caught() != 0; };
@@ -95,9 +95,9 @@ void run(FuzzArguments& arguments, int& exit_status) {
     settings.progress = [&](const fuzz::Campaign& now) {
       double worst = 0;
       std::int64_t failed = 0;
-      for (const auto& tally : now.tallies) {
-        worst = std::max(worst, tally.worst);
-        failed += tally.failed;
+      for (const auto& counted : now.statistics) {
+        worst = std::max(worst, counted.worst);
+        failed += counted.failed;
       }
       const std::string note = fmt::format("{:.0f} per second, worst score {:.3f}, {} failures",
                                            static_cast<double>(now.cases) / now.seconds, worst, failed);
@@ -109,8 +109,8 @@ void run(FuzzArguments& arguments, int& exit_status) {
   }
   fmt::print("{}", fuzz::campaign_table(result));
   if (!arguments.report.empty()) fuzz::write_campaign(arguments.report, result, info);
-  const bool holds =
-      std::all_of(result.tallies.begin(), result.tallies.end(), [](const fuzz::Tally& t) { return t.failed == 0; });
+  const bool holds = std::all_of(result.statistics.begin(), result.statistics.end(),
+                                 [](const fuzz::PropertyStatistics& t) { return t.failed == 0; });
   exit_status = holds ? exit_pass : exit_does_not_conform;
   if (StopSignal::caught() == 0) return;
   fmt::print("interrupted: {} problems asked\n", result.cases);
@@ -138,7 +138,7 @@ void add_fuzz_command(CLI::App& app, int& exit_status) {
       ->capture_default_str();
   verb.add_option("--report", arguments->report, "HDF5 file (oracle/formats/fuzz.md)");
   verb.add_option("--failures", arguments->failures, "folder for what fails")->capture_default_str();
-  verb.add_option("--most-findings", arguments->most_findings, "findings after which to stop")
+  verb.add_option("--most-findings", arguments->most_counterexamples, "findings after which to stop")
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
   verb.add_flag("--no-shrink", arguments->no_shrink, "failures are kept as they are found");

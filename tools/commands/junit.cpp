@@ -5,10 +5,12 @@
 #include "oracle/report/console_table.hpp"
 
 #include <fmt/format.h>
+#include <pugixml.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <sstream>
 #include <vector>
 
 namespace decant {
@@ -21,7 +23,7 @@ struct Case {
   std::vector<const CheckRow*> rows;
 
   bool has(Verdict verdict) const {
-    return std::any_of(rows.begin(), rows.end(), [&](const CheckRow* row) { return judged_verdict(*row) == verdict; });
+    return std::any_of(rows.begin(), rows.end(), [&](const CheckRow* row) { return verdict_of(*row) == verdict; });
   }
   bool fails() const { return has(Verdict::fail); }
   bool skipped() const { return !fails() && has(Verdict::not_run); }
@@ -57,8 +59,11 @@ struct Counts {
       skipped += c.skipped();
     }
   }
-  std::string attributes() const {
-    return fmt::format(R"(tests="{}" failures="{}" errors="0" skipped="{}")", tests, failures, skipped);
+  void write(pugi::xml_node node) const {
+    node.append_attribute("tests") = tests;
+    node.append_attribute("failures") = failures;
+    node.append_attribute("errors") = 0;
+    node.append_attribute("skipped") = skipped;
   }
 };
 
@@ -66,43 +71,48 @@ struct Counts {
 const CheckRow& worst_of(const Case& c, Verdict verdict) {
   const CheckRow* worst = nullptr;
   for (const CheckRow* row : c.rows) {
-    if (judged_verdict(*row) != verdict) continue;
+    if (verdict_of(*row) != verdict) continue;
     if (!worst || std::isnan(row->score) || row->score > worst->score) worst = row;
   }
   return *worst;
 }
 
 std::string message_of(const CheckRow& row) {
-  if (row.n == 0) return check_label(row) + ": " + judged_reason(row);
+  if (row.n == 0) return check_label(row) + ": " + reason_of(row);
   const auto unit = row.unit.empty() || row.unit == "1" ? "" : " " + row.unit;
   const auto where = row.worst_id >= 0 ? fmt::format(", particle {}", row.worst_id) : "";
-  return fmt::format("{}{}: value {:.6g}{}, tolerance {:.6g}{}, score {:.4g}", check_label(row), where, row.value, unit,
+  return fmt::format("{}{}: error {:.6g}{}, tolerance {:.6g}{}, score {:.4g}", check_label(row), where, row.error, unit,
                      row.tolerance, unit, row.score);
 }
 
-std::string case_xml(const Suite& suite, const Case& c) {
-  std::string xml = fmt::format(R"(    <testcase classname="{}.{}" name="{}")", xml_escaped(suite.name),
-                                xml_escaped(c.fixture), xml_escaped(c.check));
+void set(pugi::xml_node node, const char* name, std::string_view value) {
+  node.append_attribute(name).set_value(xml_text(value).c_str());
+}
+
+void add_case(pugi::xml_node suite, const std::string& name, const Case& c) {
+  pugi::xml_node node = suite.append_child("testcase");
+  set(node, "classname", name + "." + c.fixture);
+  set(node, "name", c.check);
   if (c.fails()) {
     std::string text;
     for (const CheckRow* row : c.rows)
-      if (judged_verdict(*row) != Verdict::pass) text += in_full(*row);
-    return xml + fmt::format(
-                     ">\n      <failure type=\"{}\" message=\"{}\">{}</failure>\n"
-                     "    </testcase>\n",
-                     xml_escaped(c.check), xml_escaped(message_of(worst_of(c, Verdict::fail))), xml_escaped(text));
+      if (verdict_of(*row) != Verdict::pass) text += in_full(*row);
+    pugi::xml_node failure = node.append_child("failure");
+    set(failure, "type", c.check);
+    set(failure, "message", message_of(worst_of(c, Verdict::fail)));
+    failure.text().set(xml_text(text).c_str());
+  } else if (c.skipped()) {
+    set(node.append_child("skipped"), "message", reason_of(worst_of(c, Verdict::not_run)));
   }
-  if (c.skipped())
-    return xml + fmt::format(">\n      <skipped message=\"{}\"/>\n    </testcase>\n",
-                             xml_escaped(judged_reason(worst_of(c, Verdict::not_run))));
-  return xml + "/>\n";
 }
 
-std::string properties_xml(const std::map<std::string, std::string>& provenance) {
-  std::string xml = "    <properties>\n";
-  for (const auto& [name, value] : provenance)
-    xml += fmt::format("      <property name=\"{}\" value=\"{}\"/>\n", xml_escaped(name), xml_escaped(value));
-  return xml + "    </properties>\n";
+void add_properties(pugi::xml_node suite, const std::map<std::string, std::string>& provenance) {
+  pugi::xml_node properties = suite.append_child("properties");
+  for (const auto& [name, value] : provenance) {
+    pugi::xml_node property = properties.append_child("property");
+    set(property, "name", name);
+    set(property, "value", value);
+  }
 }
 
 /// Bytes of the UTF-8 character that the text begins with; 0 where it is none that XML holds.
@@ -123,58 +133,40 @@ std::size_t character_length(std::string_view text) {
 
 }  // namespace
 
-std::string xml_escaped(std::string_view text) {
+std::string xml_text(std::string_view text) {
   std::string out;
   while (!text.empty()) {
-    std::size_t length = 1;
-    switch (text[0]) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      case '\'':
-        out += "&apos;";
-        break;
-      case '\r':
-        out += "&#13;";
-        break;
-      case '\t':
-      case '\n':
-        out += text[0];
-        break;
-      default:
-        length = character_length(text);
-        out += length > 0 ? text.substr(0, length) : replacement;
-        length = std::max<std::size_t>(length, 1);
-    }
-    text.remove_prefix(length);
+    const bool space = text[0] == '\t' || text[0] == '\n' || text[0] == '\r';
+    std::size_t length = space ? 1 : character_length(text);
+    out += length > 0 ? text.substr(0, length) : replacement;
+    text.remove_prefix(std::max<std::size_t>(length, 1));
   }
   return out;
 }
 
 std::string junit_xml(const Report& report) {
   const auto suites = suites_of(report);
+  pugi::xml_document document;
+  pugi::xml_node declaration = document.append_child(pugi::node_declaration);
+  set(declaration, "version", "1.0");
+  set(declaration, "encoding", "UTF-8");
+  pugi::xml_node root = document.append_child("testsuites");
+  set(root, "name", "decant conform");
   Counts all;
   for (const Suite& suite : suites) all.add(suite);
-  std::string xml = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
-  xml += fmt::format("<testsuites name=\"decant conform\" {}>\n", all.attributes());
+  all.write(root);
   for (const Suite& suite : suites) {
+    pugi::xml_node node = root.append_child("testsuite");
+    set(node, "name", suite.name);
     Counts counts;
     counts.add(suite);
-    xml += fmt::format("  <testsuite name=\"{}\" {}>\n", xml_escaped(suite.name), counts.attributes());
-    xml += properties_xml(report.provenance);
-    for (const Case& c : suite.cases) xml += case_xml(suite, c);
-    xml += "  </testsuite>\n";
+    counts.write(node);
+    add_properties(node, report.provenance);
+    for (const Case& c : suite.cases) add_case(node, suite.name, c);
   }
-  return xml + "</testsuites>\n";
+  std::ostringstream out;
+  document.save(out, "  ");
+  return out.str();
 }
 
 }  // namespace decant

@@ -14,9 +14,8 @@ namespace decant {
 /// not pass), and is skipped where none fails and one did not run.
 std::string junit_xml(const Report& report);
 
-/// Text as it may stand in an XML element or attribute (where readers take line feeds for spaces):
-/// markup as references; what is no UTF-8, and control characters, which XML cannot hold, as
-/// U+FFFD.
-std::string xml_escaped(std::string_view text);
+/// Text with U+FFFD for what XML 1.0 cannot hold: bytes that are no UTF-8, and control characters, which pugixml
+/// would write as references that no reader accepts.
+std::string xml_text(std::string_view text);
 
 }  // namespace decant

@@ -230,7 +230,8 @@ int record(const RecordArguments& arguments) {
     fixture.scene = scene;
     backend->read(fixture.state);
     fixture.state.substep = now;
-    const std::string weakness = record_answer(fixture, arguments.ensemble_substeps, arguments.ensemble_members);
+    const std::string ill_posed_reason =
+        record_answer(fixture, arguments.ensemble_substeps, arguments.ensemble_members);
     const auto beyond = beyond_limits(scene, fixture.state, fixture.fields->density);
     if (arguments.sample) reduce_to_sample(fixture);
     fixture.provenance = provenance_of(arguments, info, start);
@@ -247,7 +248,7 @@ int record(const RecordArguments& arguments) {
                  std::filesystem::file_size(file));
     if (!arguments.quiet)
       for (const std::string& one : beyond) fmt::print(stderr, "warning: {}: {}\n", file, one);
-    if (!weakness.empty()) fmt::print(stderr, "warning: {}: {}\n", file, weakness);
+    if (!ill_posed_reason.empty()) fmt::print(stderr, "warning: {}: {}\n", file, ill_posed_reason);
     std::fflush(stdout);
   }
   return exit_pass;

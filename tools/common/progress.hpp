@@ -4,6 +4,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
@@ -11,6 +12,10 @@ namespace decant {
 
 /// "3 h 05 min", "2 min 07 s", "41 s". \param seconds  s
 std::string duration_text(double seconds);
+
+/// A bar and a text that a terminal of so many columns holds in one line: the bar gives way first, then the text's
+/// end. \param share  done of all, 0 … 1
+std::string progress_line(std::size_t columns, double share, const std::string& text);
 
 /// Reports to standard error.
 class Progress {
@@ -24,8 +29,8 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// \param note  shown behind the bar
-  void update(std::int64_t done, const std::string& note = {});
+  /// \param note  shown behind the bar; \param part  of the step after those done, 0 … 1
+  void update(std::int64_t done, const std::string& note = {}, double part = 0);
   /// Ends the bar's line, so that other output can follow; a later update starts a new one.
   void pause();
 
@@ -34,7 +39,7 @@ class Progress {
 
   std::string what_;
   std::int64_t total_, first_;
-  bool quiet_, terminal_, line_open_ = false;
+  bool quiet_, terminal_, begun_ = false, line_open_ = false;
   Clock::time_point start_ = Clock::now(), last_ = start_;
 };
 

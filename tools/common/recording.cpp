@@ -9,11 +9,11 @@ namespace decant {
 
 std::string record_answer(Fixture& fixture, std::int64_t ensemble_substeps, std::int64_t ensemble_members) {
   fixture.state.quantise();
-  std::string weakness =
+  std::string ill_posed_reason =
       evaluate_oracle(fixture.scene, fixture.state, fixture.fields.emplace(), fixture.condition.emplace());
   fixture.ensemble =
       run_ensemble(fixture.scene, sample_walls(fixture.scene), fixture.state, ensemble_substeps, ensemble_members);
-  return weakness;
+  return ill_posed_reason;
 }
 
 }  // namespace decant

@@ -88,7 +88,7 @@ struct WholePour {
   ListChoice list;
   std::uint32_t perturbation = 0;    // not 0: complete lists, and a start perturbed by rounding
   std::string trouble;               // of the backend; the rest is then NaN
-  std::array<double, 5> share_at{};  // of the mass, by Place, at the end
+  std::array<double, 5> share_at{};  // of the mass, by Region, at the end
   std::int64_t inside = 0;           // particles seen inside a solid, largest count
   double kinetic_peak = not_measured, energy_lost = not_measured;  // J
   double energy_drift = not_measured;                              // RMS over the pour, over the energy lost
@@ -130,14 +130,13 @@ using ListMaker = std::function<std::unique_ptr<Backend>(const std::string& opti
 /// Throws BackendError where a backend reports trouble, as the functions below do.
 void require_ok(const Backend& backend, const Status& status);
 
-/// Calls work(k) for k < n on all cores; the first exception is thrown when all are done.
-void in_parallel(int n, const std::function<void(int)>& work);
-
 /// Means and worst of one list's samples.
 DriftRow summed_up(const std::string& fixture, const std::vector<DriftSample>& samples);
 
-/// Measures one window. \param fixture  its recorded fields are not needed
-DriftResult measure_drift(const Fixture& fixture, const DriftPlan& plan, const ListMaker& make_list);
+/// Measures one window. \param fixture  its recorded fields are not needed; \param progress  called now and then, from
+/// one thread at a time, with the part that is done, 0 … 1
+DriftResult measure_drift(const Fixture& fixture, const DriftPlan& plan, const ListMaker& make_list,
+                          const std::function<void(double)>& progress = {});
 
 /// Times every list from the fixture's state and follows it beside complete ones.
 void time_and_follow(const Fixture& fixture, const Walls& walls, int window, const ListMaker& make_list,
@@ -148,9 +147,9 @@ void time_and_follow(const Fixture& fixture, const Walls& walls, int window, con
 std::vector<ListChoice> derived_lists(const std::vector<Fixture>& fixtures, const std::vector<int>& intervals,
                                       double tolerance);
 
-/// Runs a scene with complete lists; at `looks` moments what each list would miss just before its rebuild,
+/// Runs a scene with complete lists; at `samples` moments what each list would miss just before its rebuild,
 /// and the state at each of `phases`.
-PourDrift along_pour(const Scene& scene, const DriftPlan& plan, int looks, const ListMaker& make_list,
+PourDrift along_pour(const Scene& scene, const DriftPlan& plan, int samples, const ListMaker& make_list,
                      std::vector<Fixture>& phases);
 
 /// Does one part of long work: calls what it is given, or never returns.

@@ -81,7 +81,7 @@ struct Course {
   WholePour pour;
 };
 
-constexpr int looks_at_whole = 100;
+constexpr int samples_at_whole = 100;
 
 Course run_course(const Scene& scene, const Walls& walls, const ParticleState& start, Backend& backend) {
   Course course;
@@ -89,18 +89,18 @@ Course run_course(const Scene& scene, const Walls& walls, const ParticleState& s
   backend.load(scene, walls, start);
   ParticleState state = start;
   const std::int64_t all = std::int64_t{scene.schedule.frames} * scene.schedule.substeps_per_frame;
-  for (int look = 0;; ++look) {
-    const AuditResult seen = audit.look(state);
+  for (int sample = 0;; ++sample) {
+    const AuditResult seen = audit.sample(state);
     course.energy.push_back(seen.kinetic_energy + seen.potential_energy);
     course.momentum.push_back(momentum(scene, state));
     course.pour.inside = std::max(course.pour.inside, seen.inside);
     if (!(course.pour.kinetic_peak >= seen.kinetic_energy)) course.pour.kinetic_peak = seen.kinetic_energy;
-    if (look == looks_at_whole) {
+    if (sample == samples_at_whole) {
       for (std::size_t p = 0; p < seen.particles_at.size(); ++p)
         course.pour.share_at[p] = static_cast<double>(seen.particles_at[p]) / static_cast<double>(state.size());
       break;
     }
-    const Status status = backend.advance(static_cast<int>(all * (look + 1) / looks_at_whole - state.substep));
+    const Status status = backend.advance(static_cast<int>(all * (sample + 1) / samples_at_whole - state.substep));
     if (!status.ok()) {
       course.pour = {};
       course.pour.trouble = describe(status);

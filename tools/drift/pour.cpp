@@ -5,16 +5,18 @@
 #include "reference/sampling.hpp"
 #include "tools/drift/drift.hpp"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <set>
 
 namespace decant {
 
-PourDrift along_pour(const Scene& scene, const DriftPlan& plan, int looks, const ListMaker& make_list,
+PourDrift along_pour(const Scene& scene, const DriftPlan& plan, int samples, const ListMaker& make_list,
                      std::vector<Fixture>& phases) {
   const Walls walls = sample_walls(scene);
-  const WallAnswer volumes = wall_answer(scene, walls);
+  const WallSolution volumes = wall_solution(scene, walls);
   const std::int64_t all = std::int64_t{scene.schedule.frames} * scene.schedule.substeps_per_frame;
   std::set<int> ages = {0};
   for (const ListChoice& list : plan.lists) ages.insert(list.interval - 1);
@@ -42,8 +44,8 @@ PourDrift along_pour(const Scene& scene, const DriftPlan& plan, int looks, const
 
   PourDrift pour;
   pour.fixture = scene.name;
-  for (int look = 0; look < looks; ++look) {
-    const std::int64_t built = all * look / looks;
+  for (int sample = 0; sample < samples; ++sample) {
+    const std::int64_t built = all * sample / samples;
     pass_phases(built);
     go_to(built);
     std::vector<ParticleState> states;
@@ -53,16 +55,16 @@ PourDrift along_pour(const Scene& scene, const DriftPlan& plan, int looks, const
       states.push_back(state);
     }
     std::vector<Instant> instants(states.size());
-    in_parallel(static_cast<int>(states.size()), [&](int k) {
-      const auto at = static_cast<std::size_t>(k);
+    tbb::parallel_for(std::size_t{0}, states.size(), [&](std::size_t k) {
+      const auto at = k;
       instants[at] = look_at(scene, walls, volumes, states[at]);
     });
     std::vector<PourMoment> moments(plan.lists.size());
-    in_parallel(static_cast<int>(plan.lists.size()), [&](int k) {
-      const ListChoice& list = plan.lists[static_cast<std::size_t>(k)];
+    tbb::parallel_for(std::size_t{0}, plan.lists.size(), [&](std::size_t k) {
+      const ListChoice& list = plan.lists[k];
       const auto at = static_cast<std::size_t>(std::distance(ages.begin(), ages.find(list.interval - 1)));
       const Staleness stale = StaleList(scene, volumes.volume, instants.front(), list.skin).at(instants[at]);
-      moments[static_cast<std::size_t>(k)] = {
+      moments[k] = {
           scene.time_at(built),
           {list, built + list.interval - 1, stale, stale.provably_complete(list.skin, scene.support_radius())}};
     });

@@ -155,8 +155,8 @@ void write_whole(Hdf5Writer& out, const std::vector<WholePour>& pours) {
   list_columns(c);
   c.whole("perturbation", [](const W& w) { return w.perturbation; }, "seed of a start perturbed by rounding; 0: none");
   c.text("trouble", [](const W& w) { return w.trouble.empty() ? "none" : w.trouble; });
-  for (std::size_t p = 0; p < place_names.size(); ++p)
-    c.real((std::string("share_") + place_names[p]).c_str(), "1", [p](const W& w) { return w.share_at[p]; });
+  for (std::size_t p = 0; p < region_names.size(); ++p)
+    c.real((std::string("share_") + region_names[p]).c_str(), "1", [p](const W& w) { return w.share_at[p]; });
   c.whole("inside", [](const W& w) { return w.inside; }, "particles seen inside a wall, most at once");
   c.real("kinetic_peak", "J", [](const W& w) { return w.kinetic_peak; });
   c.real("energy_lost", "J", [](const W& w) { return w.energy_lost; });
@@ -235,10 +235,10 @@ std::string pour_table(const std::vector<PourDrift>& pours) {
         text += fmt::format("  {:>9} {:>5} {}\n", name, number(w.list.skin, "{:.2f}"), w.trouble);
         continue;
       }
-      const auto at = [&](Place place) { return percent(w.share_at[static_cast<std::size_t>(place)]); };
+      const auto at = [&](Region place) { return percent(w.share_at[static_cast<std::size_t>(place)]); };
       text += fmt::format("  {:>9} {:>5} {:>10} {:>8} {:>8} {:>8} {:>7} {:>9} {:>9} {:>8} {:>8} {:>8.1f}\n", name,
-                          number(w.list.skin, "{:.2f}"), at(Place::receiver), at(Place::source), at(Place::spilled),
-                          at(Place::lost), w.inside, percent(w.energy_drift), percent(w.momentum_drift),
+                          number(w.list.skin, "{:.2f}"), at(Region::receiver), at(Region::source), at(Region::spilled),
+                          at(Region::lost), w.inside, percent(w.energy_drift), percent(w.momentum_drift),
                           percent(w.missed_share), percent(w.wall_missed_share), w.rebuild_every);
     }
   }

@@ -69,7 +69,7 @@ DriftResult measure_series(const Fixture& fixture, const std::filesystem::path& 
     in.fail("/@decant_list_series", fmt::format("{}", schema), "1");
   const Scene& scene = fixture.scene;
   const Walls walls = sample_walls(scene);
-  const WallAnswer volumes = wall_answer(scene, walls);
+  const WallSolution volumes = wall_solution(scene, walls);
   const auto n = fixture.state.size();
   const auto states = static_cast<std::int64_t>(in.children("/state").size());
   if (states == 0) in.fail("/state", "empty", "groups 0, 1, …, one a state");

@@ -6,12 +6,13 @@
 #include "tools/drift/drift.hpp"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <exception>
 #include <map>
+#include <mutex>
 
 namespace decant {
 namespace {
@@ -168,27 +169,13 @@ void require_ok(const Backend& backend, const Status& status) {
   if (!status.ok()) throw BackendError(backend.info().name + ": " + describe(status));
 }
 
-void in_parallel(int n, const std::function<void(int)>& work) {
-  std::exception_ptr trouble;
-#pragma omp parallel for schedule(dynamic)
-  for (int k = 0; k < n; ++k) {
-    try {
-      work(k);
-    } catch (...) {
-#pragma omp critical
-      trouble = std::current_exception();
-    }
-  }
-  if (trouble) std::rethrow_exception(trouble);
-}
-
 std::vector<ListChoice> derived_lists(const std::vector<Fixture>& fixtures, const std::vector<int>& intervals,
                                       double tolerance) {
   std::vector<ListChoice> lists;
   for (const int interval : intervals) lists.push_back({interval, 0, true});
   for (const Fixture& fixture : fixtures) {
     const Walls walls = sample_walls(fixture.scene);
-    const WallAnswer volumes = wall_answer(fixture.scene, walls);
+    const WallSolution volumes = wall_solution(fixture.scene, walls);
     const PairsNearEdge near =
         pairs_near_edge(fixture.scene, volumes.volume, look_at(fixture.scene, walls, volumes, fixture.state));
     for (ListChoice& list : lists) {
@@ -200,11 +187,21 @@ std::vector<ListChoice> derived_lists(const std::vector<Fixture>& fixtures, cons
   return lists;
 }
 
-DriftResult measure_drift(const Fixture& fixture, const DriftPlan& plan, const ListMaker& make_list) {
+DriftResult measure_drift(const Fixture& fixture, const DriftPlan& plan, const ListMaker& make_list,
+                          const std::function<void(double)>& progress) {
   const auto start = Clock::now();
+  std::vector<Build> builds = builds_of(plan);
+  std::mutex mutex;
+  std::size_t done = 0;
+  const std::size_t all = static_cast<std::size_t>(plan.window) + 1 + builds.size();
+  const auto one_done = [&] {
+    const std::lock_guard lock(mutex);
+    ++done;
+    if (progress) progress(std::min(1.0, static_cast<double>(done) / static_cast<double>(all)));
+  };
   const Scene& scene = fixture.scene;
   const Walls walls = sample_walls(scene);
-  const WallAnswer volumes = wall_answer(scene, walls);
+  const WallSolution volumes = wall_solution(scene, walls);
   DriftResult result;
   result.fixture = fixture.name;
   result.particle_spacing = scene.particle_spacing;
@@ -213,16 +210,16 @@ DriftResult measure_drift(const Fixture& fixture, const DriftPlan& plan, const L
 
   const auto states = run_window(fixture, walls, *make_list(""), plan.window);
   std::vector<Instant> window(states.size());
-  in_parallel(static_cast<int>(states.size()), [&](int k) {
-    const auto at = static_cast<std::size_t>(k);
-    window[at] = look_at(scene, walls, volumes, states[at]);
+  tbb::parallel_for(std::size_t{0}, states.size(), [&](std::size_t k) {
+    window[k] = look_at(scene, walls, volumes, states[k]);
+    one_done();
   });
-  std::vector<Build> builds = builds_of(plan);
-  in_parallel(static_cast<int>(builds.size()), [&](int k) {
-    Build& build = builds[static_cast<std::size_t>(k)];
+  tbb::parallel_for(std::size_t{0}, builds.size(), [&](std::size_t k) {
+    Build& build = builds[k];
     const StaleList list(scene, volumes.volume, window[static_cast<std::size_t>(build.built)], build.skin);
     for (int now = build.built; now <= build.last; ++now)
       build.ages.push_back(list.at(window[static_cast<std::size_t>(now)]));
+    one_done();
   });
 
   const PairsNearEdge near = pairs_near_edge(scene, volumes.volume, window.front());

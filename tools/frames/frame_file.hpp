@@ -39,7 +39,7 @@ struct Frame {
   double time = 0;                        // s
   std::vector<float> position, velocity;  // 3N, m and m/s
   std::vector<float> density, pressure;   // N, kg/m³ and Pa
-  std::vector<std::uint8_t> place;        // N, decant::Place
+  std::vector<std::uint8_t> place;        // N, decant::Region
   std::vector<std::vector<float>> wall;   // a moving wall each, in the layout's order: 3V, m, world
 };
 

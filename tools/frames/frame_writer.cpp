@@ -20,7 +20,7 @@ Frame make_frame(const Scene& scene, const FrameLayout& layout, std::int64_t ind
   Eigen::Map<Eigen::Matrix3Xf>(frame.velocity.data(), 3, state.size()) = state.velocity.cast<float>();
   Eigen::Map<Eigen::VectorXf>(frame.density.data(), state.size()) = fields.density.cast<float>();
   Eigen::Map<Eigen::VectorXf>(frame.pressure.data(), state.size()) = fields.pressure.cast<float>();
-  frame.place = audit.place;
+  frame.place = audit.region;
   for (std::size_t c = 0; c < layout.walls.size(); ++c)
     if (layout.walls[c].moving)
       frame.wall.push_back(posed_vertices(scene.containers.at(c), layout.walls[c].surface, frame.time));

@@ -43,11 +43,12 @@ class Running {
     for (int t = 0; t < s_.threads; ++t) threads.emplace_back([this] { work(); });
     for (auto& thread : threads) thread.join();
     if (trouble_) std::rethrow_exception(trouble_);
-    for (auto& [key, tally] : tallies_) all_.tallies.push_back(tally);
-    std::sort(all_.findings.begin(), all_.findings.end(), [](const Finding& a, const Finding& b) {
-      return std::tie(a.seed, a.outcome.backend, a.outcome.property) <
-             std::tie(b.seed, b.outcome.backend, b.outcome.property);
-    });
+    for (auto& [key, counted] : tallies_) all_.statistics.push_back(counted);
+    std::sort(all_.counterexamples.begin(), all_.counterexamples.end(),
+              [](const Counterexample& a, const Counterexample& b) {
+                return std::tie(a.seed, a.outcome.backend, a.outcome.property) <
+                       std::tie(b.seed, b.outcome.backend, b.outcome.property);
+              });
     all_.seconds = seconds();
     return all_;
   }
@@ -69,12 +70,12 @@ class Running {
         const std::int64_t k = next_.fetch_add(1);
         if (over(k)) break;
         const std::uint64_t seed = s_.first_seed + static_cast<std::uint64_t>(k);
-        const Genome genome = random_genome(seed);
-        const Fixture problem = problem_of(genome, fmt::format("fuzz-{}", seed));
+        const Case fuzz_case = random_case(seed);
+        const Fixture problem = fixture_of(fuzz_case, fmt::format("fuzz-{}", seed));
         const std::vector<Outcome> outcomes = tester.test(problem, seed);
-        take(classes_of(problem), outcomes, seed);
+        take(tags_of(problem), outcomes, seed);
         for (const Outcome& outcome : outcomes)
-          if (!outcome.holds) find(tester, seed, genome, outcome);
+          if (!outcome.holds) find(tester, seed, fuzz_case, outcome);
       }
     } catch (...) {
       const std::lock_guard lock(mutex_);
@@ -83,46 +84,46 @@ class Running {
     }
   }
 
-  void take(const Classes& classes, const std::vector<Outcome>& outcomes, std::uint64_t seed) {
+  void take(const Tags& tags, const std::vector<Outcome>& outcomes, std::uint64_t seed) {
     const std::lock_guard lock(mutex_);
     ++all_.cases;
-    for (std::size_t c = 0; c < classes.size(); ++c) all_.classes[c] += classes[c];
+    for (std::size_t c = 0; c < tags.size(); ++c) all_.tags[c] += tags[c];
     if (outcomes.empty()) ++all_.undecidable;
     for (const Outcome& o : outcomes) {
-      Tally& tally = tallies_[{o.property, o.backend}];
-      tally.backend = o.backend;
-      tally.property = o.property;
-      ++tally.asked;
-      tally.failed += !o.holds;
-      ++tally.histogram[bin_of(o.holds ? o.score : 2)];
-      if (o.score < tally.worst || (o.score == tally.worst && seed >= tally.worst_seed)) continue;
-      tally.worst = o.score;
-      tally.worst_seed = seed;
-      tally.worst_field = o.field;
+      PropertyStatistics& counted = tallies_[{o.property, o.backend}];
+      counted.backend = o.backend;
+      counted.property = o.property;
+      ++counted.asked;
+      counted.failed += !o.holds;
+      ++counted.histogram[bin_of(o.holds ? o.score : 2)];
+      if (o.score < counted.worst || (o.score == counted.worst && seed >= counted.worst_seed)) continue;
+      counted.worst = o.score;
+      counted.worst_seed = seed;
+      counted.worst_field = o.field;
     }
     if (!s_.progress || std::chrono::duration<double>(Clock::now() - told_).count() < 1) return;
     told_ = Clock::now();
     all_.seconds = seconds();
     Campaign now = all_;
-    for (auto& [key, tally] : tallies_) now.tallies.push_back(tally);
+    for (auto& [key, counted] : tallies_) now.statistics.push_back(counted);
     s_.progress(now);
   }
 
-  /// One finding a property and backend is shrunk; the others are counted.
-  void find(Tester& tester, std::uint64_t seed, const Genome& genome, const Outcome& outcome) {
+  /// One counterexample a property and backend is minimised; the others are counted.
+  void find(Tester& tester, std::uint64_t seed, const Case& fuzz_case, const Outcome& outcome) {
     {
       const std::lock_guard lock(mutex_);
       if (!shrunk_.insert(outcome.backend + " " + outcome.property).second) return;
     }
-    Finding found;
+    Counterexample found;
     found.seed = seed;
-    found.genome = genome;
+    found.fuzz_case = fuzz_case;
     found.outcome = outcome;
-    found = shrink(tester, std::move(found), s_.shrink_tries);
+    found = minimise(tester, std::move(found), s_.minimise_tries);
     const std::lock_guard lock(mutex_);
     if (!s_.failures.empty()) found.file = write_finding(s_.failures, found);
-    all_.findings.push_back(std::move(found));
-    if (static_cast<int>(all_.findings.size()) >= s_.most_findings) ended_ = true;
+    all_.counterexamples.push_back(std::move(found));
+    if (static_cast<int>(all_.counterexamples.size()) >= s_.most_counterexamples) ended_ = true;
   }
 
   const Settings& s_;
@@ -131,7 +132,7 @@ class Running {
   std::atomic<std::int64_t> next_{0};
   std::atomic<bool> ended_{false};
   std::mutex mutex_;
-  std::map<std::pair<std::string, std::string>, Tally> tallies_;  // by property and backend
+  std::map<std::pair<std::string, std::string>, PropertyStatistics> tallies_;  // by property and backend
   std::set<std::string> shrunk_;
   Campaign all_;
   std::exception_ptr trouble_;
@@ -141,10 +142,10 @@ class Running {
 
 Campaign run_campaign(const Settings& settings, const BackendMaker& make) { return Running(settings, make).run(); }
 
-std::string write_problem(const std::filesystem::path& folder, const Genome& genome, const std::string& name,
+std::string write_problem(const std::filesystem::path& folder, const Case& fuzz_case, const std::string& name,
                           const std::map<std::string, std::string>& provenance) {
   std::filesystem::create_directories(folder);
-  Fixture fixture = problem_of(genome, name);
+  Fixture fixture = fixture_of(fuzz_case, name);
   fixture.provenance = build_provenance();
   for (const auto& [key, text] : provenance) fixture.provenance[key] = text;
   (void)record_answer(fixture, run_substeps, run_members);
@@ -154,16 +155,16 @@ std::string write_problem(const std::filesystem::path& folder, const Genome& gen
   return file.string();
 }
 
-std::string write_finding(const std::filesystem::path& folder, const Finding& finding) {
-  std::string backend = finding.outcome.backend;
+std::string write_finding(const std::filesystem::path& folder, const Counterexample& counterexample) {
+  std::string backend = counterexample.outcome.backend;
   for (char& c : backend)
     if (c == ':' || c == '=') c = '-';
-  return write_problem(folder, finding.genome,
-                       fmt::format("fuzz-{}-{}-{}", finding.seed, backend, finding.outcome.property),
-                       {{"fuzz_seed", fmt::format("{}", finding.seed)},
-                        {"fuzz_property", finding.outcome.property},
-                        {"fuzz_backend", finding.outcome.backend},
-                        {"fuzz_reason", finding.outcome.reason}});
+  return write_problem(folder, counterexample.fuzz_case,
+                       fmt::format("fuzz-{}-{}-{}", counterexample.seed, backend, counterexample.outcome.property),
+                       {{"fuzz_seed", fmt::format("{}", counterexample.seed)},
+                        {"fuzz_property", counterexample.outcome.property},
+                        {"fuzz_backend", counterexample.outcome.backend},
+                        {"fuzz_reason", counterexample.outcome.reason}});
 }
 
 }  // namespace decant::fuzz

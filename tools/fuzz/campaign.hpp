@@ -1,10 +1,10 @@
 /// \file
-/// A fuzzing campaign: problems from consecutive seeds, held to properties; what fails is shrunk, written
+/// A fuzzing campaign: problems from consecutive seeds, held to properties; what fails is minimised, written
 /// as a fixture that shows it again, and reported.
 #pragma once
 
 #include "oracle/backend.hpp"
-#include "tools/fuzz/genome.hpp"
+#include "tools/fuzz/case.hpp"
 
 #include <array>
 #include <filesystem>
@@ -52,7 +52,7 @@ class Tester {
   /// problem's neighbors apart, and no property is asked.
   std::vector<Outcome> test(const Fixture& problem, std::uint64_t seed);
   /// One property of one backend, whosever turn it is.
-  Outcome test_one(const Genome& genome, std::uint64_t seed, const Outcome& like);
+  Outcome test_one(const Case& fuzz_case, std::uint64_t seed, const Outcome& like);
 
  private:
   std::vector<Outcome> outcomes(const Fixture& problem, std::uint64_t seed, const std::set<std::string>& backends,
@@ -66,22 +66,22 @@ class Tester {
   std::vector<std::pair<std::string, std::unique_ptr<Backend>>> made_;
 };
 
-/// A failure and what shrinking left of it.
-struct Finding {
+/// A failure and what minimising left of it.
+struct Counterexample {
   std::uint64_t seed = 0;
-  Outcome outcome;  // of the shrunk problem
-  Genome genome;    // shrunk
+  Outcome outcome;  // of the minimised problem
+  Case fuzz_case;   // minimised
   std::size_t found_particles = 0;
-  int tries = 0;     // problems tried while shrinking
+  int tries = 0;     // problems tried while minimising
   std::string file;  // the fixture written; empty: none
 };
 
 /// Fewer particles, then smaller numbers, as long as the same property of the same backend fails.
 /// Ends after so many tries or seconds.
-Finding shrink(Tester& tester, Finding found, int most_tries, double seconds = 20);
+Counterexample minimise(Tester& tester, Counterexample found, int most_tries, double seconds = 20);
 
 /// Scores of a property of a backend over all problems.
-struct Tally {
+struct PropertyStatistics {
   std::string backend, property;
   std::int64_t asked = 0, failed = 0;
   double worst = 0;
@@ -98,9 +98,9 @@ struct Settings {
   std::int64_t cases = 1000;  // of consecutive seeds; < 0: as many as there is time for
   double seconds = 0;         // 0: no limit
   int threads = 1;
-  int most_findings = 16;  // a campaign stops here
-  int shrink_tries = 2000;
-  std::filesystem::path failures;  // folder for fixtures of findings; empty: none are written
+  int most_counterexamples = 16;  // a campaign stops here
+  int minimise_tries = 2000;
+  std::filesystem::path failures;  // folder for fixtures of counterexamples; empty: none are written
   std::function<bool()> stop;
   std::function<void(const struct Campaign&)> progress;  // now and then, from one thread at a time
   bool one_core_each = true;                             // OpenMP inside a backend is switched off
@@ -111,19 +111,19 @@ struct Campaign {
   std::int64_t cases = 0;        // problems drawn, consecutive
   std::int64_t undecidable = 0;  // of them, not held to anything
   double seconds = 0;
-  std::array<std::int64_t, class_names.size()> classes{};
-  std::vector<Tally> tallies;
-  std::vector<Finding> findings;
+  std::array<std::int64_t, tag_names.size()> tags{};
+  std::vector<PropertyStatistics> statistics;
+  std::vector<Counterexample> counterexamples;
 };
 
-/// Runs. The same seeds give the same tallies, whatever the number of threads.
+/// Runs. The same seeds give the same statistics, whatever the number of threads.
 Campaign run_campaign(const Settings& settings, const BackendMaker& make);
 
 /// Writes a problem with the oracle's answer, for `decant conform`, and its scene beside it; returns the
 /// fixture's file.
-std::string write_problem(const std::filesystem::path& folder, const Genome& genome, const std::string& name,
+std::string write_problem(const std::filesystem::path& folder, const Case& fuzz_case, const std::string& name,
                           const std::map<std::string, std::string>& provenance);
-std::string write_finding(const std::filesystem::path& folder, const Finding& finding);
+std::string write_finding(const std::filesystem::path& folder, const Counterexample& counterexample);
 
 /// Table for people.
 std::string campaign_table(const Campaign& campaign);

@@ -42,7 +42,7 @@ Outcome joined(const std::string& backend, const std::string& property, const st
   for (const CheckRow& row : rows) {
     const bool mine = property == "fields" ? !checked.contains(row.check) : row.check == property;
     if (!mine) continue;
-    const bool fails = judged_verdict(row) != Verdict::pass;
+    const bool fails = verdict_of(row) != Verdict::pass;
     // More particles than usual may stand where fp32 cannot tell; that says nothing about a backend.
     if (fails && row.excluded > 0 && (row.n == 0 || row.score <= 1)) continue;
     if (fails && (o.holds || !(row.score <= o.score)))
@@ -87,22 +87,22 @@ bool each_step_holds(Backend& backend, const Fixture& f, const Walls& walls, con
                      bool interrupted) {
   Fixture now = f;
   for (int k = 1; k <= run_substeps; ++k) {
-    const Judgement oracle = prepare(now, {"substep"});
+    const PreparedReference oracle = prepare_reference(now, {"substep"});
     ParticleState next;
     try {
       next = state_after(backend, f, walls, parts, interrupted, k);
     } catch (const BackendError&) {
       return false;
     }
-    Sheet sheet(backend.info(), f.name);
-    judge_substep(next, all_answered(), now, oracle, sheet);
-    if (!joined("", "substep", sheet.take()).holds) return false;
+    RowBuilder builder(backend.info(), f.name);
+    check_substep(next, all_answered(), now, oracle, builder);
+    if (!joined("", "substep", builder.take()).holds) return false;
     now.state = next;
   }
   return true;
 }
 
-/// Whether a run in unequal parts, with looks and loads in between, ends where one in one piece does, as
+/// Whether a run in unequal parts, with samples and loads in between, ends where one in one piece does, as
 /// near as runs perturbed by rounding do.
 Outcome sequence(Backend& backend, const std::string& name, const Fixture& f, const Walls& walls, std::uint64_t seed) {
   const int a = 1 + static_cast<int>(seed / 8 % 3), b = 1 + static_cast<int>(seed / 24 % 3);
@@ -234,8 +234,9 @@ std::vector<Outcome> Tester::test(const Fixture& problem, std::uint64_t seed) {
   return outcomes(problem, seed, {names_.begin(), names_.end()}, wanted);
 }
 
-Outcome Tester::test_one(const Genome& genome, std::uint64_t seed, const Outcome& like) {
-  for (Outcome& o : outcomes(problem_of(genome, fmt::format("fuzz-{}", seed)), seed, {like.backend}, {like.property}))
+Outcome Tester::test_one(const Case& fuzz_case, std::uint64_t seed, const Outcome& like) {
+  for (Outcome& o :
+       outcomes(fixture_of(fuzz_case, fmt::format("fuzz-{}", seed)), seed, {like.backend}, {like.property}))
     if (o.backend == like.backend && o.property == like.property) return o;
   return {like.backend, like.property, true, 0, "", ""};
 }
@@ -267,8 +268,8 @@ std::vector<Outcome> Tester::outcomes(const Fixture& problem, std::uint64_t seed
   CheckSelection checks = chosen_checks();
   // Looks ahead: where the oracle's own run bursts out of the domain, nothing is asked of runs.
   if (wanted.contains("sequence") || wanted.contains("lists") || wanted.contains("advanced")) checks.insert("mass");
-  const Judgement oracle = prepare(fixture, checks);
-  if (!weakness(oracle.own).empty()) return {};
+  const PreparedReference oracle = prepare_reference(fixture, checks);
+  if (!ill_posed_reason(oracle.own).empty()) return {};
   const Scene& scene = fixture.scene;
   const ParticleState& state = fixture.state;
   if (oracle.later.size() == state.size() && !inside(scene, oracle.later.position))
@@ -285,7 +286,7 @@ std::vector<Outcome> Tester::outcomes(const Fixture& problem, std::uint64_t seed
       std::vector<CheckRow> rows;
       std::string trouble;
       try {
-        rows = judge(backend(name), fixture, oracle, checks);
+        rows = run_checks(backend(name), fixture, oracle, checks);
       } catch (const std::exception& error) {
         trouble = error.what();
       }

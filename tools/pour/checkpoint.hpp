@@ -1,6 +1,6 @@
 /// \file
 /// checkpoint.h5: what an interrupted pour needs to end in the same bits as an uninterrupted one.
-/// The state is kept in double; what a backend carries from one stretch of a frame to the next is a
+/// The state is kept in double; what a backend carries from one segment of a frame to the next is a
 /// function of it. The audit follows paths from where it last looked, which is kept where that is not the
 /// state itself.
 #pragma once
@@ -24,7 +24,7 @@ inline constexpr std::int64_t checkpoint_schema = 2;
 struct PartOfFrame {
   Eigen::Matrix3Xd looked_at;  // 3×N, m, positions when the audit last looked
   std::int64_t looked_at_substep = 0;
-  AuditResult on_the_way;              // the worst of the looks since the frame before; no places
+  AuditResult on_the_way;              // the worst of the samples since the frame before; no places
   std::int64_t fastest_particle = -1;  // of the largest speed among them
   double solver_seconds = 0;           // s, wall time of advancing since the frame before
 };

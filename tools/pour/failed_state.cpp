@@ -28,7 +28,7 @@ std::string save_failed_state(const std::filesystem::path& file, const Scene& sc
     fixture.state = good;
     fixture.state.quantise();
     evaluate_oracle(scene, fixture.state, fixture.fields.emplace(), fixture.condition.emplace());
-    // A short one: whoever replays this state looks at what comes next.
+    // A short one: whoever runs this state again looks at what comes next.
     fixture.ensemble = run_ensemble(scene, sample_walls(scene), fixture.state, 4, 4);
     if (good.size() > largest_whole_dump) reduce_to_sample(fixture);
     fixture.provenance = build_provenance();

@@ -11,7 +11,7 @@
 
 namespace decant {
 
-/// Writes the last good state as a fixture that can be judged and replayed. Returns what to say of it,
+/// Writes the last good state as a fixture that can be judged and run again. Returns what to say of it,
 /// also where it could not be saved: "; the last good state, substep 15, is in DIR/failed-state.h5".
 std::string save_failed_state(const std::filesystem::path& file, const Scene& scene, const ParticleState& good,
                               const BackendInfo& backend, const std::string& trouble);

@@ -22,7 +22,7 @@
 #include "tools/pour/folder_lock.hpp"
 #include "tools/pour/limits.hpp"
 #include "tools/pour/pour_folder.hpp"
-#include "tools/pour/stretches.hpp"
+#include "tools/pour/segments.hpp"
 
 #include <fmt/format.h>
 
@@ -81,7 +81,7 @@ class Pour {
   void start();
   void resume();
   void open_frames(bool anew);
-  void look(const Fields& fields);
+  void sample(const Fields& fields);
   bool next_stretch();
   void tell_limits();
   void checkpoint();
@@ -103,7 +103,7 @@ class Pour {
   Backend& backend_;
   const PourOptions& options_;
   const PourFiles files_;
-  const Stretches stretches_;
+  const Segments stretches_;
   const SceneLimits limits_;
   std::optional<FolderLock> lock_;
   Audit audit_;
@@ -164,7 +164,7 @@ PourResult Pour::result() {
   return r;
 }
 
-/// By the watching thread, while the pouring one is in a call. The stretch under way is lost.
+/// By the watching thread, while the pouring one is in a call. The segment under way is lost.
 void Pour::leave() {
   PourResult last;
   last.frame = options_.resume ? frame_ : -1;
@@ -199,7 +199,7 @@ void Pour::start() {
   open_frames(true);
   Fields fields = Fields::unwritten(state_.size(), walls_.size());
   check(call([&] { return backend_.evaluate(fields); }), state_);
-  look(fields);
+  sample(fields);
   checkpoint();
   begun_ = true;
 }
@@ -212,7 +212,7 @@ void Pour::resume() {
   if (const std::int64_t done = done_in_frame();
       done < 0 || (done > 0) != from.part.has_value() || done >= stretches_.substeps() || !stretches_.meet_at(done))
     throw InputError(files_.checkpoint.string(), "substep", std::to_string(state_.substep),
-                     fmt::format("where a stretch of frame {} ends", frame_ + 1));
+                     fmt::format("where a segment of frame {} ends", frame_ + 1));
   timeline_ = std::move(from.timeline);
   stages_before_ = timeline_.stages;
   wall_before_ = from.wall_seconds;
@@ -228,7 +228,7 @@ void Pour::resume() {
     looked_at.substep = part_.looked_at_substep;
     looked_at.position = part_.looked_at;
   }
-  (void)audit_.look(looked_at);
+  (void)audit_.sample(looked_at);
   open_frames(false);
   begun_ = true;
   if (!options_.quiet)
@@ -261,8 +261,8 @@ void Pour::open_frames(bool anew) {
 }
 
 /// What there is to say of the frame that was reached.
-void Pour::look(const Fields& fields) {
-  AuditResult audit = audit_.look(state_);
+void Pour::sample(const Fields& fields) {
+  AuditResult audit = audit_.sample(state_);
   const bool fastest_now = audit.max_speed >= part_.on_the_way.max_speed;
   keep_worst(audit, part_.on_the_way);
   TimelineRow row;
@@ -312,11 +312,11 @@ bool Pour::next_stretch() {
   if (whole) {
     check(evaluated, state_);
     ++frame_;
-    look(fields);
+    sample(fields);
     return true;
   }
-  if (stretches_.looks_at(end)) {
-    const AuditResult seen = audit_.look(state_);
+  if (stretches_.samples_at(end)) {
+    const AuditResult seen = audit_.sample(state_);
     if (seen.max_speed > part_.on_the_way.max_speed) part_.fastest_particle = fastest_in(state_);
     keep_worst(part_.on_the_way, seen);
     part_.looked_at = state_.position;

@@ -25,7 +25,7 @@ struct PourOptions {
   std::filesystem::path out;
   bool csv = false, resume = false, quiet = false;
   double checkpoint_seconds = 30;  // s, wall time between checkpoints; 0: as often as can be
-  /// Asked after every stretch of a frame; true: leave a checkpoint and return. Where `leave` is given, asked
+  /// Asked after every segment of a frame; true: leave a checkpoint and return. Where `leave` is given, asked
   /// by another thread too.
   std::function<bool()> stop;
   /// Ends the process where a call of the backend's is still under way half a second after a stop: called

@@ -14,8 +14,8 @@ namespace decant {
 std::string pour_json(const PourResult& result, const BackendInfo& info, const std::string& out) {
   const PourSummary& s = result.summary;
   nlohmann::ordered_json places, stages;
-  for (std::size_t p = 0; p < place_names.size(); ++p)
-    places[place_names[p]] = {{"mass_kg", s.mass_at[p]}, {"fraction", s.fraction_at[p]}};
+  for (std::size_t p = 0; p < region_names.size(); ++p)
+    places[region_names[p]] = {{"mass_kg", s.mass_at[p]}, {"fraction", s.fraction_at[p]}};
   for (const StageName& stage : stage_names) {
     const StageTimes::Stage& time = result.timeline.stages.*stage.stage;
     stages[stage.name] = {{"seconds", time.seconds}, {"calls", time.calls}};
@@ -71,8 +71,8 @@ void print_pour(const PourResult& result, const BackendInfo& info, const Scene& 
   const PourSummary& s = result.summary;
   fmt::print("{}: {} particles, {} frames, {} substeps of {:.3g} s; {} ({}) on {}\n", scene.name, s.particles, s.frames,
              s.substeps, scene.time_step(), info.name, info.precision, info.device);
-  for (std::size_t p = 0; p < place_names.size(); ++p)
-    fmt::print("  {:<10} {:9.3f} g {:7.2f} %\n", place_names[p], 1e3 * s.mass_at[p], 1e2 * s.fraction_at[p]);
+  for (std::size_t p = 0; p < region_names.size(); ++p)
+    fmt::print("  {:<10} {:9.3f} g {:7.2f} %\n", region_names[p], 1e3 * s.mass_at[p], 1e2 * s.fraction_at[p]);
   fmt::print(
       "  {:<10} {:9.3f} g, {}\n", "all", 1e3 * s.mass,
       s.balanced() ? "added up at every frame" : fmt::format("DID NOT ADD UP at {} frames", s.unbalanced_frames));

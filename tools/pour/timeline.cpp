@@ -100,11 +100,11 @@ void Timeline::write(Hdf5Writer& out, const std::string& group) const {
   for (const IntegerColumn& c : integer_columns)
     out.integers(group + "/" + c.name, column<IdVector>(rows, [&](const TimelineRow& r) { return r.*c.member; }),
                  c.description);
-  for (std::size_t p = 0; p < place_names.size(); ++p) {
-    out.vector(group + "/mass/" + place_names[p],
+  for (std::size_t p = 0; p < region_names.size(); ++p) {
+    out.vector(group + "/mass/" + region_names[p],
                column<Eigen::VectorXd>(rows, [&](const TimelineRow& r) { return r.mass_at[p]; }), "kg",
                "fluid at this place");
-    out.integers(group + "/particles/" + place_names[p],
+    out.integers(group + "/particles/" + region_names[p],
                  column<IdVector>(rows, [&](const TimelineRow& r) { return r.particles_at[p]; }),
                  "particles at this place");
   }
@@ -130,9 +130,9 @@ Timeline Timeline::read(const Hdf5Reader& in, const std::string& group) {
     fill(in.vector(group + "/" + c.name, n), [&](TimelineRow& r, double v) { r.*c.member = v; });
   for (const IntegerColumn& c : integer_columns)
     fill(in.integers(group + "/" + c.name, n), [&](TimelineRow& r, std::int64_t v) { r.*c.member = v; });
-  for (std::size_t p = 0; p < place_names.size(); ++p) {
-    fill(in.vector(group + "/mass/" + place_names[p], n), [&](TimelineRow& r, double v) { r.mass_at[p] = v; });
-    fill(in.integers(group + "/particles/" + place_names[p], n),
+  for (std::size_t p = 0; p < region_names.size(); ++p) {
+    fill(in.vector(group + "/mass/" + region_names[p], n), [&](TimelineRow& r, double v) { r.mass_at[p] = v; });
+    fill(in.integers(group + "/particles/" + region_names[p], n),
          [&](TimelineRow& r, std::int64_t v) { r.particles_at[p] = v; });
   }
   const auto count = static_cast<std::int64_t>(stage_names.size());
@@ -162,7 +162,7 @@ PourSummary summarise(const Timeline& timeline, std::int64_t particles, double m
   for (const TimelineRow& row : timeline.rows) {
     std::int64_t counted = 0;
     double weighed = 0;
-    for (std::size_t p = 0; p < place_names.size(); ++p) {
+    for (std::size_t p = 0; p < region_names.size(); ++p) {
       counted += row.particles_at[p];
       weighed += row.mass_at[p];
     }
@@ -188,7 +188,7 @@ PourSummary summarise(const Timeline& timeline, std::int64_t particles, double m
   s.frames = last.frame;
   s.substeps = last.substep;
   s.mass_at = last.mass_at;
-  for (std::size_t p = 0; p < place_names.size(); ++p) s.fraction_at[p] = s.mass_at[p] / s.mass;
+  for (std::size_t p = 0; p < region_names.size(); ++p) s.fraction_at[p] = s.mass_at[p] / s.mass;
   s.final_kinetic_energy = last.kinetic_energy;
   s.wall_seconds = last.wall_seconds;
   if (s.substeps > 0) s.seconds_per_substep = s.solver_seconds / static_cast<double>(s.substeps);

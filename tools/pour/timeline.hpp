@@ -19,15 +19,15 @@ namespace decant {
 /// One frame's row.
 struct TimelineRow {
   std::int64_t frame = 0, substep = 0;
-  double time = 0;                                              // s
-  std::array<std::int64_t, place_names.size()> particles_at{};  // by Place
-  std::array<double, place_names.size()> mass_at{};             // kg, by Place
-  double kinetic_energy = 0, potential_energy = 0;              // J
-  double max_speed = 0;                                         // m/s
-  std::int64_t fastest_particle = -1, densest_particle = -1;    // of max_speed and max_density
-  double min_density = 0, max_density = 0;                      // kg/m³
-  double max_pressure = 0;                                      // Pa
-  double deepest = 0;                                           // m, into a solid
+  double time = 0;                                               // s
+  std::array<std::int64_t, region_names.size()> particles_at{};  // by Region
+  std::array<double, region_names.size()> mass_at{};             // kg, by Region
+  double kinetic_energy = 0, potential_energy = 0;               // J
+  double max_speed = 0;                                          // m/s
+  std::int64_t fastest_particle = -1, densest_particle = -1;     // of max_speed and max_density
+  double min_density = 0, max_density = 0;                       // kg/m³
+  double max_pressure = 0;                                       // Pa
+  double deepest = 0;                                            // m, into a solid
   std::int64_t deepest_particle = -1, inside = 0, crossed = 0, first_crossed = -1;
   double solver_seconds = 0;  // s, wall time of advancing to this frame
   double wall_seconds = 0;    // s, wall time since the start, all sessions together
@@ -69,8 +69,8 @@ void write_timeline(const std::filesystem::path& file, const Timeline& timeline,
 /// What the rows say in the end.
 struct PourSummary {
   std::int64_t particles = 0, frames = 0, substeps = 0;
-  std::array<double, place_names.size()> mass_at{};                // kg, at the end
-  std::array<double, place_names.size()> fraction_at{};            // of the whole mass
+  std::array<double, region_names.size()> mass_at{};               // kg, at the end
+  std::array<double, region_names.size()> fraction_at{};           // of the whole mass
   double mass = 0;                                                 // kg
   std::int64_t unbalanced_frames = 0;                              // frames whose places do not add up to all particles
   std::int64_t frames_inside = 0;                                  // frames with particles inside a solid

@@ -3,7 +3,7 @@
 
     merge_fuzz.py A.h5 B.h5 … --out ALL.h5
 
-Exit status: 0 joined, 2 bad input: seeds that overlap, reports of other revisions or classes.
+Exit status: 0 joined, 2 bad input: seeds that overlap, reports of other revisions or tags.
 """
 
 import argparse
@@ -11,6 +11,10 @@ import sys
 
 import h5py
 import numpy as np
+
+
+# Of a schema: coverage tags, statistics per property and backend, counterexamples.
+GROUPS = {1: ("classes", "tallies", "findings"), 2: ("tags", "statistics", "counterexamples")}
 
 
 def refuse(text):
@@ -25,6 +29,8 @@ def read(path):
         refuse(f"{path}: {error}")
     if "decant_fuzz" not in file.attrs:
         refuse(f"{path}: not a report of decant fuzz")
+    if int(file.attrs["decant_fuzz"]) not in GROUPS:
+        refuse(f"{path}: schema {file.attrs['decant_fuzz']}, not {' or '.join(map(str, GROUPS))}")
     return file
 
 
@@ -36,21 +42,21 @@ def check_seeds(files):
     return ranges[0][0]
 
 
-def joined_tallies(files):
-    tallies = {}
+def joined_statistics(files, statistics):
+    joined = {}
     for file in files:
-        group = file["tallies"]
+        group = file[statistics]
         for k in range(len(group["property"])):
             row = {name: group[name][k] for name in group}
             key = (row["property"], row["backend"])
-            known = tallies.setdefault(key, dict(row, asked=0, failed=0, worst=-1.0,
+            known = joined.setdefault(key, dict(row, asked=0, failed=0, worst=-1.0,
                                                  **{n: 0 for n in group if n.startswith("score_")}))
             for name in group:
                 if name in ("asked", "failed") or name.startswith("score_"):
                     known[name] += row[name]
             if row["worst"] > known["worst"]:
                 known.update({n: row[n] for n in ("worst", "worst_seed", "worst_field")})
-    return [tallies[key] for key in sorted(tallies)]
+    return [joined[key] for key in sorted(joined)]
 
 
 def main():
@@ -61,11 +67,12 @@ def main():
     arguments = parser.parse_args()
     files = [read(path) for path in arguments.reports]
     first = check_seeds(files)
+    tags, statistics, counterexamples = GROUPS[int(files[0].attrs["decant_fuzz"])]
     for file in files[1:]:
         if file["provenance"].attrs["git_revision"] != files[0]["provenance"].attrs["git_revision"]:
             refuse(f"{file.filename}: another revision than {files[0].filename}")
-        if list(file["classes/name"]) != list(files[0]["classes/name"]):
-            refuse(f"{file.filename}: other classes than {files[0].filename}")
+        if list(file[f"{tags}/name"]) != list(files[0][f"{tags}/name"]):
+            refuse(f"{file.filename}: other tags than {files[0].filename}")
     with h5py.File(arguments.out, "w", libver="v108") as out:
         for name in ("decant_fuzz", "executor", "device"):
             out.attrs[name] = files[0].attrs[name]
@@ -73,20 +80,20 @@ def main():
         for name in ("cases", "undecidable", "seconds"):
             out.attrs[name] = sum(f.attrs[name] for f in files)
         files[0].copy("provenance", out)
-        files[0].copy("classes", out)
-        out["classes/cases"][:] = sum(f["classes/cases"][:] for f in files)
-        rows = joined_tallies(files)
-        for name, like in files[0]["tallies"].items():
-            data = out.create_dataset(f"tallies/{name}",
+        files[0].copy(tags, out)
+        out[f"{tags}/cases"][:] = sum(f[f"{tags}/cases"][:] for f in files)
+        rows = joined_statistics(files, statistics)
+        for name, like in files[0][statistics].items():
+            data = out.create_dataset(f"{statistics}/{name}",
                                       data=np.array([row[name] for row in rows]))
             data.attrs.update(like.attrs)
-        for name, like in files[0]["findings"].items():
-            parts = [f["findings"][name][:] for f in files if len(f["findings"][name])]
-            data = out.create_dataset(f"findings/{name}",
+        for name, like in files[0][counterexamples].items():
+            parts = [f[counterexamples][name][:] for f in files if len(f[counterexamples][name])]
+            data = out.create_dataset(f"{counterexamples}/{name}",
                                       data=np.concatenate(parts) if parts else like[:])
             data.attrs.update(like.attrs)
-        failed = int(np.sum(out["tallies/failed"]))
-        print(f"{out.attrs['cases']} problems of {len(files)} reports, {failed} failures")
+        failed = int(np.sum(out[f"{statistics}/failed"]))
+        print(f"{out.attrs['cases']} cases of {len(files)} reports, {failed} failures")
 
 
 if __name__ == "__main__":

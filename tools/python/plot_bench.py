@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draws what `decant bench --json` measured: stages of a substep by backend, and how much faster than
+"""Draws what `decant bench --report FILE.json` measured: stages of a substep by backend, and how much faster than
 the published study each step of the way is (its figures are of an RTX 2080, 56,000 particles)."""
 
 import argparse

@@ -223,14 +223,16 @@ def campaigns():
     for folder in ("h200", "host"):
         path = RESULTS / folder / "fuzz.h5"
         with h5py.File(path) as file:
-            a, t = file.attrs, file["tallies"]
+            a = file.attrs
+            old = int(a["decant_fuzz"]) == 1
+            t = file["tallies" if old else "statistics"]
             backends = sorted({renamed(text(b)) for b in t["backend"][:]} - {"scene"})
             shown.append(
                 [
                     device_of(text(a["device"])),
                     ", ".join(backends),
                     f"{int(a['cases']):,}",
-                    len(file["findings/seed"]),
+                    len(file["findings/seed" if old else "counterexamples/seed"]),
                     f"{a['cases'] / a['seconds']:.0f}",
                     text(file["provenance"].attrs["git_revision"]),
                 ]

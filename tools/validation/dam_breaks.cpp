@@ -32,7 +32,7 @@ class DamFront : public CaseObserver {
         width_(column_of(inputs.scene).y()),
         folder_(inputs.experiments) {}
 
-  void look(const Moment& moment) override {
+  void sample(const Moment& moment) override {
     const double dx = scene_.particle_spacing;
     double front = 0, beside_wall = 0;
     for (Eigen::Index i = 0; i < moment.state.size(); ++i) {
@@ -129,7 +129,7 @@ class Impact : public CaseObserver {
     }
   }
 
-  void look(const Moment& moment) override {
+  void sample(const Moment& moment) override {
     const double scale = scene_.fluid.rest_density * gravity_of(scene_) * height_;
     for (std::size_t k = 0; k < probes_.size(); ++k) {
       found_[k].x.push_back(moment.time * std::sqrt(gravity_of(scene_) / height_));

@@ -24,7 +24,7 @@ class Slit : public CaseObserver {
     thickness_ = scene_.domain.max.y() - scene_.domain.min.y();
   }
 
-  void look(const Moment& moment) override {
+  void sample(const Moment& moment) override {
     const double above = static_cast<double>((moment.state.position.row(2).array() > level_).count());
     const double h = above * scene_.particle_mass() / (scene_.fluid.rest_density * width_ * thickness_);
     root_.x.push_back(moment.time);
@@ -77,10 +77,10 @@ class SlowPour : public CaseObserver {
     height_ = top - bottom;
   }
 
-  void look(const Moment& moment) override {
-    const AuditResult audit = audit_.look(moment.state);
+  void sample(const Moment& moment) override {
+    const AuditResult audit = audit_.sample(moment.state);
     volume_.x.push_back(moment.time);
-    volume_.y.push_back(audit.mass_at[static_cast<std::size_t>(Place::source)] / scene_.fluid.rest_density);
+    volume_.y.push_back(audit.mass_at[static_cast<std::size_t>(Region::source)] / scene_.fluid.rest_density);
     // Paths are not judged: between two frames a particle turns around the rim.
     inside_ += audit.inside;
   }

@@ -63,7 +63,7 @@ ValidationResult run_case(const ValidationCase& which, int resolution, const Sce
     if (!state.position.allFinite() || !state.velocity.allFinite() || !fields.density.allFinite() ||
         !fields.pressure.allFinite())
       require_ok(backend, {Status::non_finite, -1, state.substep});
-    observer->look({scene.time_at(state.substep), state, fields});
+    observer->sample({scene.time_at(state.substep), state, fields});
     if (frame_done) frame_done(frame);
   }
   result.solver_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -20,7 +20,7 @@ class FreeFall : public CaseObserver {
   explicit FreeFall(const CaseInputs& inputs)
       : scene_(inputs.scene), walls_(inputs.walls), unit_(inputs.single_precision ? unit_roundoff : 0x1p-53) {}
 
-  void look(const Moment& moment) override {
+  void sample(const Moment& moment) override {
     const Vec3 x = moment.state.position.rowwise().mean(), v = moment.state.velocity.rowwise().mean();
     const auto n = static_cast<double>(moment.state.substep);
     const double dt = scene_.time_step();
@@ -39,7 +39,7 @@ class FreeFall : public CaseObserver {
       error_over_bound_.push_back(velocity_error_ / velocity_bound_);
     }
     last_substep_ = n;
-    const OracleAnswer oracle = answer(scene_, walls_, moment.state);
+    const ReferenceSolution oracle = reference_solution(scene_, walls_, moment.state);
     tolerance_ = std::max(tolerance_, oracle.tolerance.acceleration.colwise().norm().mean() * unit_ / unit_roundoff);
     fastest_ = std::max(fastest_, moment.state.velocity.cwiseAbs().maxCoeff() + gained_);
     farthest_ = std::max(farthest_, moment.state.position.cwiseAbs().maxCoeff());
@@ -104,7 +104,7 @@ class StillWater : public CaseObserver {
         room_(room_of(inputs.scene)),
         solid_(inputs.scene.containers.at(0)) {}
 
-  void look(const Moment& moment) override {
+  void sample(const Moment& moment) override {
     const ParticleState& state = moment.state;
     level_ = static_cast<double>(state.size()) * scene_.particle_mass() / (scene_.fluid.rest_density * room_.area);
     if (moment.time < 0.75 * scene_.schedule.end) return;

@@ -67,7 +67,7 @@ struct Moment {
 class CaseObserver {
  public:
   virtual ~CaseObserver() = default;
-  virtual void look(const Moment& moment) = 0;
+  virtual void sample(const Moment& moment) = 0;
   virtual void finish(ValidationResult& result) = 0;
 };
 

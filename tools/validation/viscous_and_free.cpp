@@ -19,10 +19,10 @@ class Channel : public CaseObserver {
         peak_(peak),
         exact_(std::move(exact)) {}
 
-  void look(const Moment& moment) override {
+  void sample(const Moment& moment) override {
     const double nu = scene_.fluid.viscosity / scene_.fluid.rest_density;
     const double diffusion = moment.time * nu / (length_ * length_);  // of 1 across the channel
-    if (moment.time > 0) judge(moment, diffusion);
+    if (moment.time > 0) run_checks(moment, diffusion);
     const double next[] = {0.02, 0.05, 0.1, 0.2, 0.5};
     if (drawn_ < std::size(next) && diffusion >= next[drawn_] * (1 - 1e-9)) {
       draw(moment, diffusion);
@@ -46,7 +46,7 @@ class Channel : public CaseObserver {
   }
 
  private:
-  void judge(const Moment& moment, double diffusion) {
+  void run_checks(const Moment& moment, double diffusion) {
     double squares = 0;
     for (Eigen::Index i = 0; i < moment.state.size(); ++i) {
       const double error = moment.state.velocity(0, i) - exact_(moment.state.position(2, i), moment.time);
@@ -97,7 +97,7 @@ class Drop : public CaseObserver {
   explicit Drop(const CaseInputs& inputs)
       : scene_(inputs.scene), stretching_(inputs.scene.fills.at(0).velocity_gradient(2, 2)) {}
 
-  void look(const Moment& moment) override {
+  void sample(const Moment& moment) override {
     const auto axis = [&](int a) {
       const auto x = moment.state.position.row(a).array();
       return 2 * std::sqrt((x - x.mean()).square().mean());

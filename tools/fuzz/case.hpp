@@ -1,6 +1,6 @@
 /// \file
 /// A fuzzed problem as whole numbers: a small scene and a state in it, positions and velocities on
-/// lattices, so that faces of cells, coincidences and exact distances come up, and so that shrinking
+/// lattices, so that faces of cells, coincidences and exact distances come up, and so that minimising
 /// has somewhere to go: every number may come nearer to 0, every particle and container may leave.
 ///
 /// Legend: dx particle spacing, H support radius, c0 sound speed.
@@ -74,7 +74,7 @@ struct Vessel {
   bool operator==(const Vessel&) const = default;
 };
 
-struct Genome {
+struct Case {
   int kernel = 0;                             // KernelFamily
   int support = 4;                            // H = (1.6 + support/10) dx, 0 … 14
   int mass = 0;                               // m = (1 + mass/100) rho0 dx³
@@ -101,7 +101,7 @@ struct Genome {
   int frames = 1;
   std::vector<Point> points;
 
-  bool operator==(const Genome&) const = default;
+  bool operator==(const Case&) const = default;
   /// The room that the first container has, or the scene without one.
   const std::array<int, 3>& room() const { return vessels.empty() ? size : vessels[0].size; }
 };
@@ -109,42 +109,42 @@ struct Genome {
 /// Points of a room's lattice in a particle spacing.
 inline constexpr int fine = 64;
 
-/// A genome and its kind of state. The same seed gives the same on every machine.
-Genome random_genome(std::uint64_t seed);
+/// A case and its kind of state. The same seed gives the same on every machine.
+Case random_case(std::uint64_t seed);
 
-/// The problem; no recorded fields and no ensemble. Throws InputError where the scene is none: shrinking
+/// The problem; no recorded fields and no ensemble. Throws InputError where the scene is none: minimising
 /// tries such genomes.
-Fixture problem_of(const Genome& genome, const std::string& name);
+Fixture fixture_of(const Case& fuzz_case, const std::string& name);
 
 /// What a problem has that ports trip over, by name, in this order.
-inline constexpr std::array<const char*, 24> class_names = {"walls",
-                                                            "moving wall",
-                                                            "belt",
-                                                            "contact",
-                                                            "periodic",
-                                                            "far away",
-                                                            "isolated",
-                                                            "crowded",
-                                                            "coincident",
-                                                            "on cell faces",
-                                                            "outlier",
-                                                            "negative side",
-                                                            "tension",
-                                                            "floor",
-                                                            "one or none",
-                                                            "tilted box",
-                                                            "translating wall",
-                                                            "tilt of three keys",
-                                                            "slanted outline",
-                                                            "several containers",
-                                                            "at wall and floor",
-                                                            "periods that differ",
-                                                            "calibrated mass",
-                                                            "gravity not down"};
-using Classes = std::array<bool, class_names.size()>;
-Classes classes_of(const Fixture& fixture);
+inline constexpr std::array<const char*, 24> tag_names = {"walls",
+                                                          "moving wall",
+                                                          "belt",
+                                                          "contact",
+                                                          "periodic",
+                                                          "far away",
+                                                          "isolated",
+                                                          "crowded",
+                                                          "coincident",
+                                                          "on cell faces",
+                                                          "outlier",
+                                                          "negative side",
+                                                          "tension",
+                                                          "floor",
+                                                          "one or none",
+                                                          "tilted box",
+                                                          "translating wall",
+                                                          "tilt of three keys",
+                                                          "slanted outline",
+                                                          "several containers",
+                                                          "at wall and floor",
+                                                          "periods that differ",
+                                                          "calibrated mass",
+                                                          "gravity not down"};
+using Tags = std::array<bool, tag_names.size()>;
+Tags tags_of(const Fixture& fixture);
 
 /// "12 particles, tilting cup, wendland_c2, …" for people.
-std::string describe(const Genome& genome);
+std::string describe(const Case& fuzz_case);
 
 }  // namespace decant::fuzz

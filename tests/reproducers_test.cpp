@@ -1,12 +1,12 @@
 /// \file
-/// A failure is told with its particle's surroundings, and shows again in a fixture cut out of
+/// A failure is told with its particle's neighborhood, and shows again in a fixture cut out of
 /// them.
-#include "tools/commands/replay.hpp"
+#include "tools/commands/reproducers.hpp"
 #include "oracle/files/fixture_file.hpp"
 #include "oracle/report/console_table.hpp"
 
 #include "oracle/checks/conform.hpp"
-#include "oracle/checks/surroundings.hpp"
+#include "oracle/checks/neighborhood.hpp"
 #include "tests/edited_reference.hpp"
 #include "tests/falling_points.hpp"
 
@@ -26,15 +26,15 @@ using test::TemporaryFolder;
 const Fixture& recorded() {
   static const Fixture fixture = [] {
     Fixture f = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-stream.h5");
-    f.ensemble.substeps = 2;  // a replay runs its own, and its length does not matter here
+    f.ensemble.substeps = 2;  // a reproducer runs its own, and its length does not matter here
     f.ensemble.members = 2;
     return f;
   }();
   return fixture;
 }
 
-const Judgement& oracle() {
-  static const Judgement prepared = prepare(recorded(), {"fields"});
+const PreparedReference& oracle() {
+  static const PreparedReference prepared = prepare_reference(recorded(), {"fields"});
   return prepared;
 }
 
@@ -67,7 +67,7 @@ Edit volumes_off() {
 
 std::vector<CheckRow> judged(const Edit& edit) {
   EditedReference backend(edit);
-  return judge(backend, recorded(), oracle(), {"fields"});
+  return run_checks(backend, recorded(), oracle(), {"fields"});
 }
 
 const CheckRow& row_of(const std::vector<CheckRow>& rows, std::string_view check, std::string_view field) {
@@ -86,7 +86,7 @@ TEST(FailingRow, TellsValuePlaceAndNeighborsOfItsWorstParticle) {
   ASSERT_EQ(row.worst_id, i);
   EXPECT_EQ(row.worst_component, -1);
   EXPECT_NEAR(row.expected, fields.density[i], 1e-6);
-  EXPECT_NEAR(row.got, fields.density[i] + 10, 1e-6);
+  EXPECT_NEAR(row.actual, fields.density[i] + 10, 1e-6);
   EXPECT_EQ(Vec3(row.worst_x, row.worst_y, row.worst_z), recorded().state.position.col(i));
   EXPECT_EQ(row.fluid_neighbors, fields.fluid_neighbor_count[i]);
   EXPECT_EQ(row.wall_neighbors, fields.wall_neighbor_count[i]);
@@ -108,7 +108,7 @@ TEST(FailingRow, TellsValuePlaceAndNeighborsOfItsWorstParticle) {
 
   const std::string text = std::regex_replace(in_full(row), std::regex("\n    "), " ");
   EXPECT_NE(text.find("particle 1234: error 10 kg/m^3"), std::string::npos) << text;
-  EXPECT_NE(text.find("got 1012.29368, expected 1002.29368 kg/m^3; at ("), std::string::npos) << text;
+  EXPECT_NE(text.find("actual 1012.29368, expected 1002.29368 kg/m^3; at ("), std::string::npos) << text;
   EXPECT_NE(text.find("34 fluid neighbors, nearest " + row.nearest + "; 0 wall neighbors"), std::string::npos) << text;
 }
 
@@ -118,7 +118,7 @@ TEST(FailingRow, OfAVectorNamesTheComponent) {
   const CheckRow row = row_of(judged(edit), "acceleration", "acceleration");
   EXPECT_EQ(row.worst_id, 1234);
   EXPECT_EQ(row.worst_component, 2);
-  EXPECT_NE(console_table({{row}, {}}).find("z: got "), std::string::npos);
+  EXPECT_NE(console_table({{row}, {}}).find("z: actual "), std::string::npos);
 }
 
 TEST(FailingRow, OfBoundaryVolumesIsAtAWallParticle) {
@@ -130,55 +130,55 @@ TEST(FailingRow, OfBoundaryVolumesIsAtAWallParticle) {
 }
 
 TEST(FailingRow, OfAPermutedProblemNamesTheFixturesParticle) {
-  const Judgement turned = prepare(recorded(), {"invariance"});
+  const PreparedReference turned = prepare_reference(recorded(), {"invariance"});
   Edit edit;
   edit.found = [](const Scene&, Neighbors& near, Eigen::VectorXd&) { near.fluid[0].clear(); };
   EditedReference backend(edit);
-  const auto rows = judge(backend, recorded(), turned, {"invariance"});
+  const auto rows = run_checks(backend, recorded(), turned, {"invariance"});
   EXPECT_EQ(row_of(rows, "invariance", "permuted density").worst_id, turned.transformed.at(0).problem.original.at(0));
-  EXPECT_EQ(row_of(rows, "invariance", "moved density").worst_id, 0);
+  EXPECT_EQ(row_of(rows, "invariance", "translated density").worst_id, 0);
 }
 
-class ReplayOf : public testing::TestWithParam<std::tuple<const char*, const char*, Edit (*)()>> {};
+class ReproducerOf : public testing::TestWithParam<std::tuple<const char*, const char*, Edit (*)()>> {};
 
-TEST_P(ReplayOf, KeepsTheParticlesBitsAndShowsTheFailureAgain) {
+TEST_P(ReproducerOf, KeepsTheParticlesBitsAndShowsTheFailureAgain) {
   const auto& [check, field, edit] = GetParam();
   const CheckRow row = row_of(judged(edit()), check, field);
   const TemporaryFolder folder;
-  const auto file = folder / "cut.h5";
+  const auto file = folder / "reproducer.h5";
   std::string warning;
-  const std::string line = write_replay(file, recorded(), row, warning);
+  const std::string line = write_reproducer(file, recorded(), row, warning);
   EXPECT_EQ(warning, "");
-  const Cut cut = cut_out(recorded(), row, replay_radius * recorded().scene.support_radius());
-  ASSERT_EQ(cut.id[cut.particle], row.worst_id);
+  const Reproducer reproducer = reproducer_of(recorded(), row, reproducer_radius * recorded().scene.support_radius());
+  ASSERT_EQ(reproducer.id[reproducer.particle], row.worst_id);
 
-  const Fixture replay = read_fixture(file);
-  const Judgement its_oracle = prepare(replay, {"fields"});
-  EXPECT_LT(replay.state.size(), recorded().state.size() / 2);
-  const Fields &was = oracle().own.fields, &is = *replay.fields;
-  EXPECT_EQ(is.density[cut.particle], was.density[row.worst_id]);
-  EXPECT_EQ(is.pressure[cut.particle], was.pressure[row.worst_id]);
-  EXPECT_EQ(Vec3(is.acceleration.col(cut.particle)), Vec3(was.acceleration.col(row.worst_id)));
-  const std::string here = "particle " + std::to_string(row.worst_id) + ", here " + std::to_string(cut.particle);
-  EXPECT_EQ(replay.provenance.at("cut_around"), here);
+  const Fixture written = read_fixture(file);
+  const PreparedReference its_oracle = prepare_reference(written, {"fields"});
+  EXPECT_LT(written.state.size(), recorded().state.size() / 2);
+  const Fields &was = oracle().own.fields, &is = *written.fields;
+  EXPECT_EQ(is.density[reproducer.particle], was.density[row.worst_id]);
+  EXPECT_EQ(is.pressure[reproducer.particle], was.pressure[row.worst_id]);
+  EXPECT_EQ(Vec3(is.acceleration.col(reproducer.particle)), Vec3(was.acceleration.col(row.worst_id)));
+  const std::string here = "particle " + std::to_string(row.worst_id) + ", here " + std::to_string(reproducer.particle);
+  EXPECT_EQ(written.provenance.at("cut_around"), here);
   EXPECT_NE(line.find(here), std::string::npos) << line;
-  EXPECT_EQ(replay.provenance.at("advanced_by"), recorded().provenance.at("advanced_by"));
+  EXPECT_EQ(written.provenance.at("advanced_by"), recorded().provenance.at("advanced_by"));
 
   EditedReference backend(edit());
-  const CheckRow again = row_of(judge(backend, replay, its_oracle, {"fields"}), check, field);
-  EXPECT_EQ(judged_verdict(again), Verdict::fail);
-  EXPECT_EQ(again.error[cut.particle * (again.error.size() / replay.state.size())],
-            row.error[row.worst_id * (row.error.size() / recorded().state.size())]);
+  const CheckRow again = row_of(run_checks(backend, written, its_oracle, {"fields"}), check, field);
+  EXPECT_EQ(verdict_of(again), Verdict::fail);
+  EXPECT_EQ(again.errors[reproducer.particle * (again.errors.size() / written.state.size())],
+            row.errors[row.worst_id * (row.errors.size() / recorded().state.size())]);
 }
 
-INSTANTIATE_TEST_SUITE_P(Faults, ReplayOf,
+INSTANTIATE_TEST_SUITE_P(Faults, ReproducerOf,
                          testing::Values(std::tuple{"neighbors", "fluid_neighbor_count", &lists_cut_at_thirty},
                                          std::tuple{"density", "density", &lists_cut_at_thirty},
                                          std::tuple{"acceleration", "viscous_acceleration",
                                                     &viscosity_off_by_a_percent}),
                          [](const auto& chosen) { return std::string(std::get<1>(chosen.param)); });
 
-TEST(Replays, AreOneABackendAndFixtureOfTheFirstRowThatFailsAtAFluidParticle) {
+TEST(Reproducers, AreOneABackendAndFixtureOfTheFirstRowThatFailsAtAFluidParticle) {
   const auto row = [](const char* backend, const char* check, const char* field, std::int64_t id) {
     CheckRow r;
     r.backend = backend;
@@ -195,7 +195,7 @@ TEST(Replays, AreOneABackendAndFixtureOfTheFirstRowThatFailsAtAFluidParticle) {
   };
   Report report;
   report.rows = {row("brute", "trajectory", "energy", -1), row("brute", "boundary_volume", "boundary_volume", 5),
-                 row("brute", "invariance", "moved density", 6), row("brute", "density", "density", 7),
+                 row("brute", "invariance", "translated density", 6), row("brute", "density", "density", 7),
                  row("hash", "boundary_volume", "boundary_volume", 8)};
   report.rows.push_back(row("hash", "density", "density", 9));
   report.rows.back().options = "sort=thrust:threads_per_particle=4";
@@ -203,16 +203,16 @@ TEST(Replays, AreOneABackendAndFixtureOfTheFirstRowThatFailsAtAFluidParticle) {
   report.rows.back().verdict = Verdict::pass;
   report.rows.back().score = 0.5;
   std::vector<std::string> names;
-  for (const Replay& replay : replays_of(report, "out")) names.push_back(replay.file.string());
-  EXPECT_EQ(names, (std::vector<std::string>{"out/pour-brute-invariance-moved-density-6.h5",
+  for (const ReproducerFile& reproducer : reproducers_of(report, "out")) names.push_back(reproducer.file.string());
+  EXPECT_EQ(names, (std::vector<std::string>{"out/pour-brute-invariance-translated-density-6.h5",
                                              "out/pour-hash-boundary_volume-boundary_volume-8.h5",
                                              "out/pour-hash-sort-thrust-threads_per_particle-4-density-density-9.h5"}));
 }
 
-TEST(Surroundings, HoldFluidAndWallsWithinTheirRadiusWithTheRowsScores) {
+TEST(Neighborhood, HoldFluidAndWallsWithinTheirRadiusWithTheRowsScores) {
   const CheckRow row = row_of(judged(wall_viscosity_off_by_a_percent()), "acceleration", "wall_viscous_acceleration");
   const double radius = 6 * recorded().scene.support_radius();
-  const Surroundings s = surroundings_of(recorded(), oracle().walls, oracle().own.fields.density, row, 12, radius);
+  const Neighborhood s = neighborhood_of(recorded(), oracle().walls, oracle().own.fields.density, row, 12, radius);
   const Vec3 center(row.worst_x, row.worst_y, row.worst_z);
   int fluid = 0, worst = 0;
   for (Eigen::Index k = 0; k < s.position.cols(); ++k) {

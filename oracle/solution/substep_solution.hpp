@@ -18,7 +18,7 @@ struct SubstepOutcome {
 /// decides is never a period.
 void gather_images(const Domain& domain, std::vector<SubstepOutcome>& outcomes);
 
-struct SubstepAnswer {
+struct SubstepSolution {
   /// Per particle the oracle's own outcome, then those with its undecidable contacts decided
   /// otherwise, by the image nearest to it.
   std::vector<std::vector<SubstepOutcome>> outcomes;
@@ -34,6 +34,6 @@ struct SubstepAnswer {
 /// tau_v = dt tau_a + 2u (|v| + dt|a|), tau_x = dt tau_v + u (2|x| + 4 dt|v|), and what contacts make of
 /// them (contact_bounds.hpp).
 /// \param fields  the oracle's answer at `state`
-SubstepAnswer substep_answer(const Scene& scene, const ParticleState& state, const OracleAnswer& fields);
+SubstepSolution substep_solution(const Scene& scene, const ParticleState& state, const ReferenceSolution& fields);
 
 }  // namespace decant

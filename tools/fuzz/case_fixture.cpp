@@ -1,7 +1,7 @@
 /// \file
 /// Numbers made into a scene and a state. Containers are placed by planes that keep them H apart, and the
 /// domain reaches as far as they ever do.
-#include "tools/fuzz/genome.hpp"
+#include "tools/fuzz/case.hpp"
 
 #include "reference/pose.hpp"
 #include "reference/scene_checks.hpp"
@@ -74,7 +74,7 @@ Oscillation<Value> oscillation_of(const Oscillating& o, const Value& fastest, do
   return {period / (2 * std::numbers::pi) * fastest, 1 / period, o.phase / 8.0};
 }
 
-Translation translation_of(const Genome& g, const Vessel& v, double sound_speed, double dt) {
+Translation translation_of(const Case& g, const Vessel& v, double sound_speed, double dt) {
   Translation t;
   int substep = std::max(0, g.substep + v.translation_start);
   Vec3 offset = Vec3::Zero();
@@ -93,7 +93,7 @@ Translation translation_of(const Genome& g, const Vessel& v, double sound_speed,
 }
 
 /// A container whose room has its middle in `middle` at the state's time, upright or turned.
-Container container_of(const Genome& g, const Vessel& v, std::size_t k, const Scene& scene, const Vec3& middle) {
+Container container_of(const Case& g, const Vessel& v, std::size_t k, const Scene& scene, const Vec3& middle) {
   const double dx = scene.particle_spacing;
   const Vec3 size = dx * real(v.size);
   Container c;
@@ -159,7 +159,7 @@ double reach(const Container& c, const Scene& scene, const Vec3& direction) {
 }
 
 /// Middles of the containers' rooms at the state's time, m; puts the containers into the scene.
-std::vector<Vec3> place_containers(const Genome& g, Scene& scene, const Vec3& corner) {
+std::vector<Vec3> place_containers(const Case& g, Scene& scene, const Vec3& corner) {
   const double dx = scene.particle_spacing;
   std::vector<Vec3> middles;
   for (std::size_t k = 0; k < g.vessels.size(); ++k) {
@@ -184,7 +184,7 @@ std::vector<Vec3> place_containers(const Genome& g, Scene& scene, const Vec3& co
 }
 
 /// As far as containers, pivots and particles get, and some room.
-void make_domain(const Genome& g, Scene& scene, const Vec3& corner, const Eigen::Matrix3Xd& x) {
+void make_domain(const Case& g, Scene& scene, const Vec3& corner, const Eigen::Matrix3Xd& x) {
   const double dx = scene.particle_spacing, H = scene.support_radius();
   const Vec3 size = dx * real(g.room());
   // Boxes end where the period does, solids of revolution stand within it.
@@ -230,7 +230,7 @@ Fill fill_of(const Scene& scene, const Vec3& middle) {
 
 }  // namespace
 
-Fixture problem_of(const Genome& g, const std::string& name) {
+Fixture fixture_of(const Case& g, const std::string& name) {
   Fixture f;
   f.name = name;
   f.phase = "fuzz";

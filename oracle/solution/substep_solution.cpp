@@ -1,6 +1,6 @@
 /// \file
 /// The oracle's substep once more, carrying an error bound along with every particle.
-#include "oracle/solution/substep_answer.hpp"
+#include "oracle/solution/substep_solution.hpp"
 
 #include "oracle/solution/contact_bounds.hpp"
 
@@ -18,14 +18,14 @@ void gather_images(const Domain& domain, std::vector<SubstepOutcome>& outcomes) 
   }
 }
 
-SubstepAnswer substep_answer(const Scene& scene, const ParticleState& state, const OracleAnswer& fields) {
+SubstepSolution substep_solution(const Scene& scene, const ParticleState& state, const ReferenceSolution& fields) {
   const ContactBounds bounds(scene);
   const std::vector<Pose> poses = bounds.poses_at(scene.time_at(state.substep + 1));
   const auto n = static_cast<std::size_t>(state.size());
-  SubstepAnswer answer;
-  answer.outcomes.resize(n);
-  answer.ambiguous.assign(n, false);
-  answer.most_ambiguous = state.size() / 50 + 10;
+  SubstepSolution solution;
+  solution.outcomes.resize(n);
+  solution.ambiguous.assign(n, false);
+  solution.most_ambiguous = state.size() / 50 + 10;
   for (std::size_t k = 0; k < n; ++k) {
     const auto i = static_cast<Eigen::Index>(k);
     const auto run = [&](unsigned flips) {
@@ -37,14 +37,14 @@ SubstepAnswer substep_answer(const Scene& scene, const ParticleState& state, con
       return p;
     };
     each_decision(run, [&](const BoundedParticle& p) {
-      answer.outcomes[k].push_back({p.x, p.v, p.tau_x, p.tau_v});
+      solution.outcomes[k].push_back({p.x, p.v, p.tau_x, p.tau_v});
       if (!p.ambiguous && p.undecided <= most_undecided) return;
-      answer.ambiguous[k] = true;
-      answer.longest_push = std::max(answer.longest_push, p.pushed);
+      solution.ambiguous[k] = true;
+      solution.longest_push = std::max(solution.longest_push, p.pushed);
     });
-    gather_images(scene.domain, answer.outcomes[k]);
+    gather_images(scene.domain, solution.outcomes[k]);
   }
-  return answer;
+  return solution;
 }
 
 }  // namespace decant

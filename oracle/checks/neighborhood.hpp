@@ -22,11 +22,11 @@ void locate(const Fixture& fixture, const Walls& walls, std::vector<CheckRow>& r
 
 /// Fluid and walls within `radius` (m) of a located row's worst particle. \param density  N, kg/m³,
 /// the oracle's; \param index  the row's place in the report
-Surroundings surroundings_of(const Fixture& fixture, const Walls& walls, const Eigen::VectorXd& density,
+Neighborhood neighborhood_of(const Fixture& fixture, const Walls& walls, const Eigen::VectorXd& density,
                              const CheckRow& row, std::int64_t index, double radius);
 
 /// A fixture of part of the fluid, in the same scene at the same time.
-struct Cut {
+struct Reproducer {
   Fixture fixture;             // without fields, condition sums and ensemble
   IdVector id;                 // whose id each particle had, ascending
   std::int64_t particle = -1;  // the worst one's id in the cut, −1 for a wall particle
@@ -34,6 +34,6 @@ struct Cut {
 
 /// The fluid within `radius` (m) of a located row's worst particle. Sums over neighbors keep their
 /// order, so that with 2 H the worst particle's density, pressure and acceleration keep their bits.
-Cut cut_out(const Fixture& fixture, const CheckRow& row, double radius);
+Reproducer reproducer_of(const Fixture& fixture, const CheckRow& row, double radius);
 
 }  // namespace decant

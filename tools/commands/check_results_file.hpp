@@ -28,6 +28,6 @@ struct ResultsOutcome {
 };
 
 /// Throws InputError.
-ResultsOutcome judge_results_file(const ResultsRequest& request);
+ResultsOutcome check_results_file(const ResultsRequest& request);
 
 }  // namespace decant

@@ -1,6 +1,6 @@
 /// \file
 /// Arithmetic with whole substeps.
-#include "tools/pour/stretches.hpp"
+#include "tools/pour/segments.hpp"
 
 #include "reference/scene_checks.hpp"
 
@@ -23,27 +23,27 @@ std::int64_t looks_per_frame(const Scene& scene) {
 
 }  // namespace
 
-Stretches::Stretches(const Scene& scene) : all_(scene.schedule.substeps_per_frame), looks_(looks_per_frame(scene)) {}
+Segments::Segments(const Scene& scene) : all_(scene.schedule.substeps_per_frame), samples_(looks_per_frame(scene)) {}
 
-std::int64_t Stretches::look_of(std::int64_t done) const {
-  std::int64_t k = done * looks_ / all_;
-  while (look(k) > done) --k;
-  while (look(k + 1) <= done) ++k;
+std::int64_t Segments::sample_of(std::int64_t done) const {
+  std::int64_t k = done * samples_ / all_;
+  while (sample(k) > done) --k;
+  while (sample(k + 1) <= done) ++k;
   return k;
 }
 
-std::int64_t Stretches::end_of(std::int64_t done) const {
-  const std::int64_t k = look_of(done), begin = look(k), length = look(k + 1) - begin;
+std::int64_t Segments::end_of(std::int64_t done) const {
+  const std::int64_t k = sample_of(done), begin = sample(k), length = sample(k + 1) - begin;
   const std::int64_t parts = (length + longest - 1) / longest;
   for (std::int64_t part = (done - begin) * parts / length;; ++part)
     if (const std::int64_t end = begin + length * part / parts; end > done) return end;
 }
 
-bool Stretches::looks_at(std::int64_t done) const { return done == all_ || look(look_of(done)) == done; }
+bool Segments::samples_at(std::int64_t done) const { return done == all_ || sample(sample_of(done)) == done; }
 
-bool Stretches::meet_at(std::int64_t done) const {
-  if (looks_at(done)) return true;
-  const std::int64_t begin = look(look_of(done));
+bool Segments::meet_at(std::int64_t done) const {
+  if (samples_at(done)) return true;
+  const std::int64_t begin = sample(sample_of(done));
   return done > begin && end_of(done - 1) == done;
 }
 

@@ -1,6 +1,6 @@
 /// \file
 /// From files on the command line to rows, and how they read in a terminal.
-#include "tools/commands/results_judgement.hpp"
+#include "tools/commands/check_results_file.hpp"
 
 #include "oracle/files/fixture_file.hpp"
 #include "oracle/files/named_fields.hpp"
@@ -29,7 +29,7 @@ CheckSelection checks_of(const ResultsRequest& request) {
   return checks;
 }
 
-JudgedResults judge_on_fixture(const ResultsRequest& request, const std::string& name, Report& report) {
+CheckedResults check_on_fixture(const ResultsRequest& request, const std::string& name, Report& report) {
   if (request.fixtures.size() != 1)
     throw InputError("command line", "FIXTURE", fmt::format("{} of them", request.fixtures.size()),
                      "the one that --results was computed from (or --oracle)");
@@ -37,18 +37,18 @@ JudgedResults judge_on_fixture(const ResultsRequest& request, const std::string&
   const Fixture fixture = read_fixture(request.fixtures.front());
   const Results results = read_results(request.results, fixture);
   report.provenance["fixture_sha256." + fixture.name] = fixture.sha256;
-  const auto oracle = std::make_unique<const Judgement>(prepare(fixture, checks));
-  return judge(results, name, fixture, *oracle, checks);
+  const auto oracle = std::make_unique<const PreparedReference>(prepare_reference(fixture, checks));
+  return run_checks(results, name, fixture, *oracle, checks);
 }
 
-JudgedResults judge_on_oracle(const ResultsRequest& request, const std::string& name, Report& report) {
+CheckedResults check_on_oracle(const ResultsRequest& request, const std::string& name, Report& report) {
   if (!request.fixtures.empty())
     throw InputError("command line", "FIXTURE", request.fixtures.front(), "either FIXTURE or --oracle");
   if (!request.checks.empty())
     throw InputError("command line", "--check", request.checks.front(),
                      "none with --oracle: their fields are one check");
   report.provenance["oracle_sha256"] = sha256_of_file(request.oracle);
-  return judge_named_fields(request.oracle, request.results, name);
+  return check_named_fields(request.oracle, request.results, name);
 }
 
 std::string place_of(const CheckRow& row) { return row.check == row.field ? row.check : row.check + " / " + row.field; }
@@ -65,13 +65,13 @@ std::string table_of(const Report& given, const std::vector<CheckRow>& absent, c
 
 }  // namespace
 
-ResultsOutcome judge_results_file(const ResultsRequest& request) {
+ResultsOutcome check_results_file(const ResultsRequest& request) {
   const std::filesystem::path file(request.results);
   const std::string name = request.name.empty() ? file.stem().string() : request.name;
   ResultsOutcome outcome;
   outcome.report.provenance = build_provenance();
-  JudgedResults judged = request.oracle.empty() ? judge_on_fixture(request, name, outcome.report)
-                                                : judge_on_oracle(request, name, outcome.report);
+  CheckedResults judged = request.oracle.empty() ? check_on_fixture(request, name, outcome.report)
+                                                 : check_on_oracle(request, name, outcome.report);
   outcome.report.provenance["results_sha256"] = sha256_of_file(file);
 
   Report given;

@@ -1,6 +1,6 @@
 /// \file
 /// Distances from one particle to all others: no search by cells for one particle of a failing row.
-#include "oracle/checks/surroundings.hpp"
+#include "oracle/checks/neighborhood.hpp"
 
 #include "oracle/checks/comparison.hpp"
 #include "reference/solver.hpp"
@@ -61,14 +61,14 @@ struct Figures {
 
 Figures figures_of(const CheckRow& row, Eigen::Index particle, Eigen::Index particles) {
   Figures worst;
-  if (row.error.size() == 0 || row.error.size() != row.tolerances.size() || row.error.size() % particles != 0) {
-    if (particle == row.worst_id) worst = {row.value, row.tolerance, row.score};
+  if (row.errors.size() == 0 || row.errors.size() != row.tolerances.size() || row.errors.size() % particles != 0) {
+    if (particle == row.worst_id) worst = {row.error, row.tolerance, row.score};
     return worst;
   }
-  const Eigen::Index components = row.error.size() / particles;
+  const Eigen::Index components = row.errors.size() / particles;
   for (Eigen::Index k = components * particle; k < components * (particle + 1); ++k) {
-    const double score = score_of(row.error[k], row.tolerances[k]);
-    if (!(score <= worst.score)) worst = {row.error[k], row.tolerances[k], score};
+    const double score = score_of(row.errors[k], row.tolerances[k]);
+    if (!(score <= worst.score)) worst = {row.errors[k], row.tolerances[k], score};
   }
   return worst;
 }
@@ -82,13 +82,13 @@ bool is_of_walls(const CheckRow& row) { return row.field == "boundary_volume"; }
 void locate(const Fixture& fixture, const Walls& walls, std::vector<CheckRow>& rows) {
   std::optional<PosedWalls> posed;
   for (CheckRow& row : rows) {
-    if (judged_verdict(row) != Verdict::fail || row.worst_id < 0) continue;
+    if (verdict_of(row) != Verdict::fail || row.worst_id < 0) continue;
     if (!posed) posed = pose_walls(fixture.scene, walls, fixture.scene.time_at(fixture.state.substep));
     locate(fixture, *posed, row);
   }
 }
 
-Surroundings surroundings_of(const Fixture& fixture, const Walls& walls, const Eigen::VectorXd& density,
+Neighborhood neighborhood_of(const Fixture& fixture, const Walls& walls, const Eigen::VectorXd& density,
                              const CheckRow& row, std::int64_t index, double radius) {
   const Domain& domain = fixture.scene.domain;
   const PosedWalls posed = pose_walls(fixture.scene, walls, fixture.scene.time_at(fixture.state.substep));
@@ -97,7 +97,7 @@ Surroundings surroundings_of(const Fixture& fixture, const Walls& walls, const E
   const auto near_walls = nearer(squared_distances(domain, place_of(row), posed.position), radius);
   const auto n = static_cast<Eigen::Index>(near_fluid.size() + near_walls.size());
 
-  Surroundings s;
+  Neighborhood s;
   s.row = index;
   s.spacing = fixture.scene.particle_spacing;
   s.support_radius = fixture.scene.support_radius();
@@ -123,21 +123,21 @@ Surroundings surroundings_of(const Fixture& fixture, const Walls& walls, const E
   return s;
 }
 
-Cut cut_out(const Fixture& fixture, const CheckRow& row, double radius) {
+Reproducer reproducer_of(const Fixture& fixture, const CheckRow& row, double radius) {
   const auto kept = nearer(squared_distances(fixture.scene.domain, place_of(row), fixture.state.position), radius);
-  Cut cut;
-  cut.fixture.phase = fixture.phase;
-  cut.fixture.scene = fixture.scene;
-  cut.fixture.state.substep = fixture.state.substep;
-  cut.fixture.state.position = fixture.state.position(Eigen::all, kept);
-  cut.fixture.state.velocity = fixture.state.velocity(Eigen::all, kept);
-  cut.fixture.provenance = fixture.provenance;
-  cut.id.resize(static_cast<Eigen::Index>(kept.size()));
+  Reproducer reproducer;
+  reproducer.fixture.phase = fixture.phase;
+  reproducer.fixture.scene = fixture.scene;
+  reproducer.fixture.state.substep = fixture.state.substep;
+  reproducer.fixture.state.position = fixture.state.position(Eigen::all, kept);
+  reproducer.fixture.state.velocity = fixture.state.velocity(Eigen::all, kept);
+  reproducer.fixture.provenance = fixture.provenance;
+  reproducer.id.resize(static_cast<Eigen::Index>(kept.size()));
   for (std::size_t k = 0; k < kept.size(); ++k) {
-    cut.id[static_cast<Eigen::Index>(k)] = kept[k];
-    if (!is_of_walls(row) && kept[k] == row.worst_id) cut.particle = static_cast<std::int64_t>(k);
+    reproducer.id[static_cast<Eigen::Index>(k)] = kept[k];
+    if (!is_of_walls(row) && kept[k] == row.worst_id) reproducer.particle = static_cast<std::int64_t>(k);
   }
-  return cut;
+  return reproducer;
 }
 
 }  // namespace decant

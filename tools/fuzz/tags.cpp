@@ -1,6 +1,6 @@
 /// \file
 /// What a problem has, for tables and for people.
-#include "tools/fuzz/genome.hpp"
+#include "tools/fuzz/case.hpp"
 
 #include "reference/distance.hpp"
 #include "reference/neighbors.hpp"
@@ -36,14 +36,14 @@ bool periods_differ(const Domain& domain) {
 
 }  // namespace
 
-Classes classes_of(const Fixture& fixture) {
+Tags tags_of(const Fixture& fixture) {
   const Scene& scene = fixture.scene;
   const auto& x = fixture.state.position;
   const double H = scene.support_radius(), dx = scene.particle_spacing;
-  Classes c{};
+  Tags c{};
   const auto set = [&](const char* name) {
-    for (std::size_t k = 0; k < class_names.size(); ++k)
-      if (std::string(class_names[k]) == name) c[k] = true;
+    for (std::size_t k = 0; k < tag_names.size(); ++k)
+      if (std::string(tag_names[k]) == name) c[k] = true;
   };
   const Walls walls = sample_walls(scene);
   const double time = scene.time_at(fixture.state.substep);
@@ -98,7 +98,7 @@ Classes classes_of(const Fixture& fixture) {
   return c;
 }
 
-std::string describe(const Genome& g) {
+std::string describe(const Case& g) {
   std::string text = fmt::format("{} particle{}", g.points.size(), g.points.size() == 1 ? "" : "s");
   if (g.vessels.empty()) text += ", no walls";
   for (const Vessel& v : g.vessels) {
@@ -115,7 +115,7 @@ std::string describe(const Genome& g) {
   if (g.rest_density) text += fmt::format(", rest density {}", 1000 + 100 * g.rest_density);
   if (g.sound_speed) text += fmt::format(", c0 = {} m/s", 10 + g.sound_speed);
   if (g.gravity == std::array<int, 3>{}) text += ", no gravity";
-  else if (g.gravity != Genome{}.gravity)
+  else if (g.gravity != Case{}.gravity)
     text += fmt::format(", gravity ({:.2f}, {:.2f}, {:.2f})", g.gravity[0] / 100.0, g.gravity[1] / 100.0,
                         g.gravity[2] / 100.0);
   if (g.floor) text += ", a floor";
