@@ -16,7 +16,11 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from one_line import open_hdf5, refuse, run_main
+
 FORMATS = Path(__file__).resolve().parents[2] / "oracle" / "formats"
+PARTS = ("inputs", "results", "reference")  # all in results.md
+KINDS = [f"decant_{kind}" for kind in ("fixture", "validation", "drift", "fuzz", "report", *PARTS)]
 
 
 def rows_of(document):
@@ -27,7 +31,7 @@ def rows_of(document):
         if cells and cells[0].startswith(("`/", "`STATE")):
             rows.append((cells[0].strip("`"), *cells[1:5]))
     if not rows:
-        raise SystemExit(f"{document}: no table")
+        refuse(f"{document}: no table")
     return rows
 
 
@@ -181,12 +185,7 @@ def check_parts(check, rows, kind):
 
 
 def complaints_about(path):
-    try:
-        file = h5py.File(path, "r")
-    except OSError as error:
-        print(f"{path}: {error}", file=sys.stderr)
-        raise SystemExit(2) from error
-    with file:
+    with open_hdf5(path, KINDS, "a file that a schema document describes") as file:
         check = Checker(file)
         if "decant_fixture" in file.attrs:
             check_fixture(check, rows_of(FORMATS / "fixture.md"))
@@ -199,17 +198,16 @@ def complaints_about(path):
         elif "decant_report" in file.attrs:
             check_report(check, rows_of(FORMATS / "report.md"))
         else:
-            kinds = [k for k in ("inputs", "results", "reference") if f"decant_{k}" in file.attrs]
-            if not kinds:
-                print(f"{path}: nothing that has a schema document", file=sys.stderr)
-                raise SystemExit(2)
-            check_parts(check, rows_of(FORMATS / "results.md"), kinds[0])
+            kind = next(k for k in PARTS if f"decant_{k}" in file.attrs)
+            check_parts(check, rows_of(FORMATS / "results.md"), kind)
         return check.complaints
 
 
-def main(paths):
-    if not paths:
-        raise SystemExit(__doc__)
+def main():
+    paths = sys.argv[1:]
+    if not paths or paths[0].startswith("-"):
+        print(__doc__, end="", file=sys.stderr if paths not in (["-h"], ["--help"]) else sys.stdout)
+        return 0 if paths in (["-h"], ["--help"]) else 2
     failed = False
     for path in paths:
         found = complaints_about(path)
@@ -221,4 +219,4 @@ def main(paths):
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    run_main(main)

@@ -4,9 +4,8 @@
 import argparse
 import csv
 import re
-import sys
 
-from one_line import run_main
+from one_line import need_file, refuse, run_main
 
 COLUMNS = [  # heading, metric, scale
     ("us", "gpu__time_duration.sum", 1e-3),
@@ -25,23 +24,31 @@ def short(name):
     return re.sub(r"\(.*", "", name)[:66]
 
 
+def last_of_each(path):
+    """Figures by kernel, of its last launch. ValueError where a column is missing or holds no number."""
+    header, last = None, {}
+    with open(path, newline="", encoding="utf-8") as file:
+        for row in csv.reader(file):
+            if "Kernel Name" in row:
+                header = row
+            elif header and len(row) == len(header) and row[header.index("ID")].isdigit():
+                name = short(row[header.index("Kernel Name")])
+                last[name] = [float(row[header.index(metric)].replace(",", "")) * scale
+                              for _, metric, scale in COLUMNS]
+    return last
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("csv", help="ncu --csv --page raw")
     arguments = parser.parse_args()
-    with open(arguments.csv, newline="") as file:
-        rows = list(csv.reader(file))
-    header = None
-    last = {}
-    for row in rows:
-        if "Kernel Name" in row:
-            header = row
-        elif header and len(row) == len(header) and row[header.index("ID")].isdigit():
-            name = short(row[header.index("Kernel Name")])
-            last[name] = [float(row[header.index(metric)].replace(",", "")) * scale
-                          for _, metric, scale in COLUMNS]
+    need_file(arguments.csv, "ncu's raw CSV")
+    try:
+        last = last_of_each(arguments.csv)
+    except (ValueError, csv.Error) as error:
+        refuse(f"{arguments.csv}: not ncu's raw CSV: {error}")
     if not last:
-        sys.exit(f"{arguments.csv}: no kernels of ncu's raw page")
+        refuse(f"{arguments.csv}: no kernels of ncu's raw page")
     print(f"{'kernel':66}" + "".join(f"{heading:>13}" for heading, _, _ in COLUMNS))
     for name, values in last.items():
         print(f"{name:66}" + "".join(f"{value:13.2f}" for value in values))

@@ -7,28 +7,18 @@ Exit status: 0 joined, 2 bad input: seeds that overlap, reports of other revisio
 """
 
 import argparse
-import sys
 
 import h5py
 import numpy as np
 
+from one_line import open_hdf5, refuse, run_main
 
 # Of a schema: coverage tags, statistics per property and backend, counterexamples.
 GROUPS = {1: ("classes", "tallies", "findings"), 2: ("tags", "statistics", "counterexamples")}
 
 
-def refuse(text):
-    print(f"merge_fuzz.py: {text}", file=sys.stderr)
-    sys.exit(2)
-
-
 def read(path):
-    try:
-        file = h5py.File(path)
-    except OSError as error:
-        refuse(f"{path}: {error}")
-    if "decant_fuzz" not in file.attrs:
-        refuse(f"{path}: not a report of decant fuzz")
+    file = open_hdf5(path, ["decant_fuzz"], "a report of decant fuzz")
     if int(file.attrs["decant_fuzz"]) not in GROUPS:
         refuse(f"{path}: schema {file.attrs['decant_fuzz']}, not {' or '.join(map(str, GROUPS))}")
     return file
@@ -97,4 +87,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)

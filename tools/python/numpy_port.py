@@ -6,9 +6,9 @@ decant conform FIXTURE.h5 --results theirs.h5"""
 
 import argparse
 
-import h5py
 import numpy as np
 
+from one_line import open_hdf5, run_main
 from results_file import write_results
 
 F = np.float32
@@ -92,12 +92,16 @@ def solve(file, fault):
     return fields, accelerations(staged, file["staged/pressure"][:]) | {"pressure": pressure(staged)}
 
 
-if __name__ == "__main__":
+def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("inputs")
     parser.add_argument("--out", required=True)
     parser.add_argument("--fault", choices=FAULTS, default=FAULTS[0])
     arguments = parser.parse_args()
-    with h5py.File(arguments.inputs, "r") as opened:
+    with open_hdf5(arguments.inputs, ["decant_inputs"], "what `decant export` writes") as opened:
         write_results(arguments.out, *solve(opened, arguments.fault), device="numpy",
                       fixture_sha256=opened.attrs["fixture_sha256"].decode())
+
+
+if __name__ == "__main__":
+    run_main(main)

@@ -3,7 +3,6 @@
 the published study each step of the way is (its figures are of an RTX 2080, 56,000 particles)."""
 
 import argparse
-import json
 
 import matplotlib
 
@@ -11,7 +10,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 from option_names import current
-from one_line import run_main
+from one_line import read_json, run_main
 
 STAGES = ["build", "density", "force", "integrate"]
 COLORS = ["#4c78a8", "#f58518", "#54a24b", "#b279a2"]
@@ -34,8 +33,8 @@ def main():
     parser.add_argument("--window", default="filling")
     parser.add_argument("--out", required=True, help="PNG")
     arguments = parser.parse_args()
-    with open(arguments.bench) as file:
-        rows = [r for r in json.load(file)["rows"] if r["window"] == arguments.window]
+    found = read_json(arguments.bench, "rows", list, "JSON of decant bench")
+    rows = [r for r in found["rows"] if r["window"] == arguments.window]
     if not rows:
         parser.error(f"{arguments.bench}: no rows of window {arguments.window}")
 

@@ -4,14 +4,13 @@ cost against error with the list recommended, and missed pairs over the pour (or
 
 import argparse
 
-import h5py
 import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from one_line import run_main  # noqa: E402
+from one_line import open_hdf5, run_main  # noqa: E402
 
 COLORS = ["#4c78a8", "#e45756", "#54a24b", "#b279a2", "#f58518", "#72b7b2", "#9d755d"]
 NONE_SEEN = 1e-8  # where a list that misses nothing is drawn
@@ -109,9 +108,7 @@ def main():
     parser.add_argument("--out", required=True, help="PNG")
     parser.add_argument("--tolerance", type=float, default=1e-3, help="for the list recommended")
     arguments = parser.parse_args()
-    with h5py.File(arguments.report) as file:
-        if "decant_drift" not in file.attrs:
-            parser.error(f"{arguments.report}: not a report of decant drift")
+    with open_hdf5(arguments.report, ["decant_drift"], "a report of decant drift") as file:
         rows = columns(file["rows"])
         fixtures = list(dict.fromkeys(rows["fixture"]))
         skins = sorted({s for s in rows["skin"][rows["derived"] == 0] if not np.isnan(s)})

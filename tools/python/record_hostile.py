@@ -10,6 +10,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from one_line import run_main
+
 
 def tilted(x):
     """Points of the upright cup of hostile-cup.json where it stands after 0.2 s, at half its tilt."""
@@ -235,10 +237,11 @@ def main():
             with h5py.File(state, "w", libver="v108") as f:
                 f["position"], f["velocity"] = position, velocity
                 f.attrs["time"] = time
-            subprocess.run([a.decant, "record", a.fixtures / "scenes" / f"{scene}.json", "--from", state,
-                            "--phase", f"{name}={time}", "--out", a.fixtures / f"hostile-{name}.h5", "--quiet"],
-                           check=True)
+            run = subprocess.run([a.decant, "record", a.fixtures / "scenes" / f"{scene}.json", "--from", state,
+                                  "--phase", f"{name}={time}", "--out", a.fixtures / f"hostile-{name}.h5", "--quiet"])
+            if run.returncode:  # it has said why
+                return run.returncode if run.returncode > 0 else 128 - run.returncode
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)

@@ -8,6 +8,7 @@ The layouts are in oracle/formats/results.md. As a module: write_results, write_
 
 import argparse
 import os
+import sys
 from pathlib import Path
 
 import h5py
@@ -125,6 +126,8 @@ def rewrite(source, target):
 
             def copy(name, item):
                 if isinstance(item, h5py.Dataset):
+                    if item.dtype.kind not in "biuf":
+                        raise TypeError(f"{source}: /{name} holds no numbers, but files of results hold nothing else")
                     put(file, name, item[()])
                 else:
                     file.require_group(name)
@@ -133,10 +136,21 @@ def rewrite(source, target):
     whole_file(target, fill)
 
 
-if __name__ == "__main__":
+def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("source", type=Path)
     parser.add_argument("--out", type=Path, required=True)
     arguments = parser.parse_args()
-    rewrite(arguments.source, arguments.out)
+    if arguments.source.is_dir():
+        raise IsADirectoryError(f"{arguments.source}: a folder, not an HDF5 file")
+    try:
+        rewrite(arguments.source, arguments.out)
+    except TypeError as error:
+        sys.exit(str(error))
+
+
+if __name__ == "__main__":
+    import one_line  # here: as a module this file needs no other of the folder
+
+    one_line.run_main(main)

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import h5py
 
+from one_line import read_text, refuse, run_main
 from option_names import current
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -306,7 +307,9 @@ def main():
     ]
     differ = 0
     for path in documents:
-        before = path.read_text(encoding="utf-8")
+        before = read_text(path, "a Markdown document")
+        if arguments.document and not BLOCK.search(before):
+            refuse(f"{path}: no table is marked in it")
         after = filled(before, path)
         if before == after:
             continue
@@ -322,4 +325,4 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_main(main)
