@@ -6,14 +6,20 @@ with all its points, and saves a picture of one of them.
         pvpython tools/python/open_in_paraview.py build/pour-4k --out paraview.png --time 1.6
 
 Debian: apt-get install paraview python3-paraview xvfb xauth. Without -noreset the X server may reset
-between ParaView's connections, which ends it. Exit status 1 where something is missing.
+between ParaView's connections, which ends it. Exit status 1 where steps, points or arrays are missing, 2 where
+the folder holds no complete pour: the XDMF files are written when it ends.
 """
 import argparse
 import os
 import sys
 import xml.etree.ElementTree as xml
 
-from paraview import servermanager, simple
+from one_line import need_file, refuse
+
+try:
+    from paraview import servermanager, simple
+except ImportError as missing:
+    refuse(f"{missing}: run it with pvpython")
 
 
 def open_xdmf(file):
@@ -25,9 +31,37 @@ def open_xdmf(file):
 
 def expected(file):
     """Times and points a step, as the XDMF says."""
-    steps = xml.parse(file).getroot().findall("./Domain/Grid/Grid")
-    times = [float(step.find("Time").get("Value")) for step in steps]
-    return times, int(steps[0].find("Topology").get("NumberOfElements"))
+    try:
+        steps = xml.parse(file).getroot().findall("./Domain/Grid/Grid")
+        times = [float(step.find("Time").get("Value")) for step in steps]
+        return times, int(steps[0].find("Topology").get("NumberOfElements"))
+    except (xml.ParseError, AttributeError, IndexError, TypeError, ValueError) as error:
+        refuse(f"{file}: not the XDMF of a pour, or cut off: {error}")
+
+
+def check_folder(folder):
+    """Refuses a folder without a complete pour; ParaView's own words for that fill a screen."""
+    if not os.path.isdir(folder):
+        refuse(f"{folder}: not a folder; a pour's --out is needed")
+    if os.path.exists(os.path.join(folder, "frames.h5.partial")):
+        refuse(f"{folder}: the pour is not complete: the same `decant pour` with --resume ends it and writes the "
+               "XDMF files; render_pour.py draws the frames that there are")
+    for name in ("frames.xdmf", "walls.xdmf", "frames.h5"):
+        need_file(os.path.join(folder, name), f"{name} of a pour")
+    check_whole(os.path.join(folder, "frames.h5"))
+
+
+def check_whole(file):
+    """Refuses what is no HDF5 file, and one that is cut off: the reader crashes on it."""
+    with open(file, "rb") as opened:
+        head = opened.read(64)
+    # Where the superblock of versions 0 to 3 says how long the file is; h5py is not there for every pvpython.
+    at = {0: 40, 1: 44, 2: 28, 3: 28}.get(head[8] if len(head) == 64 else None)
+    if at is None or not head.startswith(b"\x89HDF\r\n\x1a\n"):
+        refuse(f"{file}: not the frames of a pour")
+    length = int.from_bytes(head[at:at + 8], "little")
+    if os.path.getsize(file) < length:
+        refuse(f"{file}: cut off, {os.path.getsize(file)} of {length} bytes")
 
 
 def arrays(reader):
@@ -113,6 +147,7 @@ def main():
     parser.add_argument("--moving-walls", action="store_true",
                         help="fail where the walls' bounds are the same at the end as at the start")
     a = parser.parse_args()
+    check_folder(a.folder)
     times, points = expected(os.path.join(a.folder, "frames.xdmf"))
     fluid = open_xdmf(os.path.join(a.folder, "frames.xdmf"))
     walls = open_xdmf(os.path.join(a.folder, "walls.xdmf"))
