@@ -13,49 +13,13 @@ its options), and `<!-- /help -->`. Exit status: 0 written, or the same; 1 with 
 import argparse
 import difflib
 import re
-import subprocess
 import sys
 from pathlib import Path
 
+from command_help import help_of
+from one_line import read_text, refuse, run_main
+
 BLOCK = re.compile(r"(<!-- help: (\S+)(?: (\S+))? -->\n).*?(<!-- /help -->)", re.DOTALL)
-GROUPS = {"positionals": "own", "options": "own", "options of backends": "backends"}
-CONTINUED = 12 * " "  # descriptions begin further on, names do not
-# "--windows INT:INT in [1 - 1000]=5 ... REQUIRED  what"; later CLI11 writes " [5] " instead of "=5".
-OPTION = re.compile(r"  (?P<name>(?:-\w,\s*)?--[\w-]+|[A-Z]+)"
-                    r"(?: (?P<type>[A-Z]+(?::[A-Z]+ in \[[^\]]*\])?)(?:=(?P<old>\S+)| \[(?P<new>\S+)\])?"
-                    r"(?P<many> +\.\.\.)?(?P<required> +REQUIRED)?)?(?: +(?P<what>\S.*))?")
-
-
-def refuse(text):
-    print(f"command_reference.py: {text}", file=sys.stderr)
-    sys.exit(2)
-
-
-def help_of(decant, verb):
-    """Options by group, each a match of OPTION with its description; and the notes below them."""
-    try:
-        run = subprocess.run([decant, verb, "--help"], capture_output=True, encoding="utf-8")
-    except OSError as error:
-        refuse(error)
-    if run.returncode != 0:
-        refuse(f"`{decant} {verb} --help` exits with {run.returncode}: {run.stderr.strip()}")
-    groups, group, lines = {"own": [], "backends": []}, None, run.stdout.splitlines()
-    for at, line in enumerate(lines):
-        heading = GROUPS.get(line.rstrip(":").lower()) if line.endswith(":") else None
-        if heading:
-            group = groups[heading]
-        elif group is None or not line.strip():
-            continue
-        elif not line.startswith("  "):
-            return groups, "\n".join(lines[at:]).strip()
-        elif line.startswith(CONTINUED) and group:
-            group[-1][1].append(line.strip())
-        else:
-            option = OPTION.fullmatch(line.rstrip())
-            if not option:
-                refuse(f"cannot read this line of `{verb} --help`: {line}")
-            group.append((option, [option["what"] or ""]))
-    return groups, ""
 
 
 def table(options):
@@ -88,10 +52,7 @@ def main():
     parser.add_argument("--decant", required=True, help="the command")
     parser.add_argument("--check", action="store_true", help="write nothing; exit status 1 where they differ")
     arguments = parser.parse_args()
-    try:
-        before = arguments.document.read_text(encoding="utf-8")
-    except OSError as error:
-        refuse(error)
+    before = read_text(arguments.document, "a document")
     if not BLOCK.search(before) or before.count("<!-- help: ") != len(BLOCK.findall(before)):
         refuse(f"{arguments.document}: no pairs of `<!-- help: VERB -->` and `<!-- /help -->`")
     after = BLOCK.sub(lambda m: f"{m[1]}{block(arguments.decant, m[2], m[3])}\n{m[4]}", before)
@@ -100,8 +61,9 @@ def main():
     elif after != before:
         sys.stdout.writelines(difflib.unified_diff(
             before.splitlines(True), after.splitlines(True), str(arguments.document), "decant --help"))
-        sys.exit(1)
+        return 1
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    run_main(main)
