@@ -29,6 +29,8 @@ THREE_WAY_CAPTION = (
     "for a reason of its own. Each on the fixture of its largest ratio.")
 
 MARK = {"pass": "✓", "fail": "✗", "not_run": "–"}
+COLUMNS_SINCE_2 = {"value": "error", "float_score": "fp32_reference_score", "got": "actual"}
+FIELDS_SINCE_2 = {"moved": "translated", "turned": "rotated"}
 
 STYLE = """
 :root { --ink: #26303a; --soft: #5b6670; --line: #d8dde2; --pass: #005a91; --fail: #b34700; }
@@ -67,13 +69,23 @@ svg text { font-family: system-ui, "DejaVu Sans", sans-serif !important; }
 """
 
 
+def renamed(row):
+    """A row of schema 2 with the names of schema 3."""
+    row = {COLUMNS_SINCE_2.get(name, name): value for name, value in row.items()}
+    first, space, rest = row["field"].partition(" ")
+    if row["check"] == "invariance" and space:
+        row["field"] = FIELDS_SINCE_2.get(first, first) + space + rest
+    return row
+
+
 def read(path):
     """Rows as dicts, provenance, and the surroundings' arrays and attributes, or None."""
     with h5py.File(path, "r") as file:
         if "decant_report" not in file.attrs:
             raise OSError("no report")
-        if file.attrs["decant_report"] != 2:
-            raise OSError(f"schema {file.attrs['decant_report']}, this script reads 2")
+        schema = file.attrs["decant_report"]
+        if schema not in (2, 3):
+            raise OSError(f"schema {schema}, this script reads 2 and 3")
         columns = {name: data[:] for name, data in file["summary"].items()}
         rows = [{name: value.decode() if isinstance(value, bytes) else value.item()
                  for name, value in zip(columns, values)} for values in zip(*columns.values())]
@@ -86,6 +98,8 @@ def read(path):
             for name in ("row", "spacing", "support_radius"):
                 cloud[name] = group.attrs[name].item()
         verdict = file.attrs["verdict"].decode()
+    if schema == 2:
+        rows = [renamed(row) for row in rows]
     for row in rows:
         options = f"({row['options']})" if row["options"] else ""
         row["label"] = f"{row['backend']}{options} {row['executor']}"
@@ -154,7 +168,7 @@ def pass_table(rows, backends, fixtures):
 
 def ratios(rows):
     """Score over that of sequential fp32, where both are."""
-    return [r["score"] / r["float_score"] for r in rows if r["float_score"] > 0]
+    return [r["score"] / r["fp32_reference_score"] for r in rows if r["fp32_reference_score"] > 0]
 
 
 def score_cell(rows):
@@ -199,11 +213,11 @@ def failing_cells(row):
     if row["n"] == 0:
         return [first, "", "", "", "", "", ""]
     unit = "" if row["unit"] in ("", "1") else text(row["unit"])
-    got = number(row["got"], 9) if row["expected"] == row["expected"] else ""
+    got = number(row["actual"], 9) if row["expected"] == row["expected"] else ""
     return [first, f"<span class={row['verdict']}>{number(row['score'])}</span>",
             f"{particle_of(row)} {component}",
             *(f"{t} <small>{unit}</small>" if t else "" for t in (
-                number(row["value"], 4), number(row["tolerance"], 4), got,
+                number(row["error"], 4), number(row["tolerance"], 4), got,
                 got and number(row["expected"], 9)))]
 
 
@@ -233,7 +247,7 @@ def failing_part(rows, cloud):
     for place in ordered((r["label"], r["fixture"]) for r in shown):
         group = [r for r in shown if (r["label"], r["fixture"]) == place]
         out += f"<h3>{text(place[0])} on {text(place[1])}</h3>\n"
-        out += table(["check", "score", "particle", "error", "tolerance", "got", "expected"],
+        out += table(["check", "score", "particle", "error", "tolerance", "actual", "expected"],
                      [failing_cells(r) for r in group])
         out += particles_table(group)
         if cloud and rows[cloud["row"]] in group:
@@ -256,7 +270,7 @@ def plots_part(rows, backends):
     judged = [r for r in rows if r["verdict"] != "not_run" and r["n"] > 0]
     exact = {r["name"] for r in judged} - {r["name"] for r in judged if r["score"] != 0}
     spread = [r for r in judged if r["score_p50"] == r["score_p50"] and r["name"] not in exact]
-    three_ways = [r for r in judged if r["float_score"] == r["float_score"]]
+    three_ways = [r for r in judged if r["fp32_reference_score"] == r["fp32_reference_score"]]
     out = ""
     if spread:
         out += plot_section("Distribution of scores", distribution_plot(spread, backends),

@@ -103,13 +103,13 @@ def distribution_plot(rows, backends):
 
 def three_way_plot(rows, backends):
     names, series, best, note = groups(
-        rows, backends, lambda r: kept(r["score"]) / max(kept(r["float_score"]), LEAST))
+        rows, backends, lambda r: kept(r["score"]) / max(kept(r["fp32_reference_score"]), LEAST))
     figure, axes = frame(names, series, "score (1: the tolerance)")
     least, most, labelled = 1, 1, set()
     for (name, backend), row in best.items():
         k = series.index(backend)
         y, score, plain = names.index(name) + offset(k, series), kept(row["score"]), \
-            kept(row["float_score"])
+            kept(row["fp32_reference_score"])
         least, most = min(least, score, plain), max(most, score, plain)
         axes.plot((plain, score), (y, y), color=COLOURS[k], lw=0.9)
         axes.plot(plain, y, "o", color="white", mec=INK, mew=0.8, ms=4,
