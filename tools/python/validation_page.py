@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Draws what `decant validate --report` found: a picture a case, simulated against reference, and a page
-with the table. At several resolutions the finest is drawn in full, the coarser ones faint."""
+"""Decides what pictures and page show of a report of `decant validate --report`: a picture a case, simulated against
+reference, and a page with the tables, which needs nothing else. At several resolutions the finest is drawn in full, the
+coarser ones faint. Layout and words of the page are in templates/validation.html.j2."""
 
 import argparse
 import base64
-import html
 from pathlib import Path
 
 import h5py
@@ -12,15 +12,11 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
-import numpy as np
 
 from one_line import run_main  # noqa: E402
+from pages import anchors, render, write_aside  # noqa: E402
 
 COLORS = ["#4c78a8", "#e45756", "#54a24b", "#b279a2", "#f58518", "#72b7b2", "#9d755d"]
-STYLE = """body{font:15px/1.5 system-ui,sans-serif;max-width:1080px;margin:2em auto;padding:0 1em;color:#222}
-table{border-collapse:collapse;font-size:13px;margin:.6em 0}td,th{padding:.15em .7em;text-align:right;
-border-bottom:1px solid #ddd}td:first-child,th:first-child{text-align:left}.pass{color:#1a7f37}
-.fail{color:#cf222e;font-weight:bold}.reported{color:#777}img{max-width:100%}h2{margin-top:2em}"""
 
 
 def text(values):
@@ -56,7 +52,7 @@ class Report:
     def read(self, path):
         with h5py.File(path) as file:
             if "decant_validation" not in file.attrs:
-                raise SystemExit(f"{path}: not a report of decant validate")
+                raise OSError(f"{path}: not a report of decant validate")
             self.provenance = {k: v.decode() if isinstance(v, bytes) else v
                                for k, v in file["provenance"].attrs.items()}
             self.runs = self.rows(file["runs"])
@@ -129,30 +125,20 @@ def draw(report, runs, out):
     return True
 
 
-def figure_of(value, share=False):
-    if np.isnan(value):
-        return "–"
-    if share:
-        return f"{value:.1e}" if value < 1e-4 else f"{100 * value:.2f} %"
-    return f"{value:.4g}"
-
-
-def table(report, runs):
-    cells = ["<tr><th>quantity<th>reference<th>result<th>error<th>allowed<th>verdict</tr>"]
+def section(report, name, anchor, out):
+    """What the page shows of one case; its picture is written as well."""
+    indices = sorted((k for k, r in enumerate(report.runs) if r["case"] == name and not r.get("replaced", False)),
+                     key=lambda k: report.runs[k]["resolution"])
+    runs = [dict(report.runs[k], quantities=[q for q in report.quantities if q["run"] == k]) for k in indices]
     for run in runs:
-        row = report.runs[run]
-        cells.append(f"<tr><td colspan=6><b>N = {row['resolution']}</b>: {row['particles']} particles, "
-                     f"dx = {row['particle_spacing']:.4g} m, {row['substeps']} substeps, "
-                     f"{row['solver_seconds']:.1f} s</td></tr>")
-        for q in report.quantities:
-            if q["run"] != run:
-                continue
-            unit = f" [{q['unit']}]" if q["unit"] not in ("", "1") else ""
-            cells.append(f"<tr><td>{html.escape(q['name'] + unit)}<td>{figure_of(q['reference'])}"
-                         f"<td>{figure_of(q['result'])}<td>{figure_of(q['error'], True)}"
-                         f"<td>{figure_of(q['allowance'], True)}"
-                         f"<td class={q['verdict']}>{q['verdict']}</tr>")
-    return "<table>" + "".join(cells) + "</table>"
+        anchored = anchors(f"{anchor}-N{run['resolution']}", [q["name"] for q in run["quantities"]])
+        for q, row_anchor in zip(run["quantities"], anchored):
+            q["anchor"] = row_anchor
+    picture = out / f"{name}.png"
+    drawn = draw(report, indices, picture)
+    return {"name": name, "anchor": anchor, "source": runs[0]["source"], "runs": runs,
+            "picture": base64.b64encode(picture.read_bytes()).decode() if drawn else "",
+            "orders": [o for o in report.orders if o["case"] == name]}
 
 
 def main():
@@ -166,29 +152,17 @@ def main():
     out.mkdir(parents=True, exist_ok=True)
     gates = [q for q in report.quantities if q["verdict"] != "reported"]
     met = sum(q["verdict"] == "pass" for q in gates)
-    page = [f"<!doctype html><meta charset=utf-8><title>Validation</title><style>{STYLE}</style>",
-            f"<h1>Validation: {met} of {len(gates)} gates met</h1>"]
     runs = [r for r in report.runs if not r.get("replaced", False)]
     backends = dict.fromkeys((r["backend"], r["options"], r["executor"], r["device"]) for r in runs)
-    page.append("<p>" + "; ".join(html.escape(" ".join(filter(None, b))) for b in backends)
-                + f". Version {html.escape(str(report.provenance.get('git_revision', '')))}.</p>")
-    for name in dict.fromkeys(r["case"] for r in runs):
-        of_case = sorted((k for k, r in enumerate(report.runs)
-                          if r["case"] == name and not r.get("replaced", False)),
-                         key=lambda k: report.runs[k]["resolution"])
-        page.append(f"<h2>{html.escape(name)}</h2>"
-                    f"<p>{html.escape(report.runs[of_case[0]]['source'])}</p>")
-        picture = out / f"{name}.png"
-        if draw(report, of_case, picture):
-            data = base64.b64encode(picture.read_bytes()).decode()
-            page.append(f'<img alt="{html.escape(name)}" src="data:image/png;base64,{data}">')
-        page.append(table(report, of_case))
-        orders = [o for o in report.orders if o["case"] == name]
-        if orders:
-            page.append("<table><tr><th>observed order<th>from<th>to<th></tr>" + "".join(
-                f"<tr><td>{html.escape(o['quantity'])}<td>{o['coarse']}<td>{o['fine']}"
-                f"<td>{o['order']:.2f}</tr>" for o in orders) + "</table>")
-    (out / "index.html").write_text("\n".join(page), encoding="utf-8")
+    names = list(dict.fromkeys(r["case"] for r in runs))
+    cases = [section(report, name, anchor, out) for name, anchor in zip(names, anchors("case", names))]
+    rows = [dict(q, case=case["name"], resolution=run["resolution"])
+            for case in cases for run in case["runs"] for q in run["quantities"]]
+    page = render("validation.html.j2", met=met, gates=len(gates), cases=cases,
+                  backends=[" ".join(filter(None, b)) for b in backends],
+                  version=report.provenance.get("git_revision", ""),
+                  failing=[q for q in rows if q["verdict"] == "fail"])
+    write_aside(out / "index.html", page)
     print(f"{met} of {len(gates)} gates met; wrote {out}/index.html")
 
 
