@@ -1,6 +1,7 @@
 """The plots of report_html.py, as SVG to stand in a page: no links, no fonts, nothing to load.
 
-Colours are Okabe and Ito's, which the colour-blind tell apart; marks differ too.
+Colours are Okabe and Ito's, which the colour-blind tell apart; marks differ too. Ink and ground are the page's, by
+name, so that a plot follows its colour scheme.
 """
 import io
 import re
@@ -11,10 +12,11 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 import numpy as np  # noqa: E402
 
-INK, SOFT, BEYOND = "#26303a", "#8a939b", "#d55e00"
+INK, SOFT, BAND, BEYOND = "#26303a", "#8a939b", "#f3f5f7", "#d55e00"
 COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#000000")
 MARKS = ("o", "s", "^", "D", "v", "P")
 LEAST, MOST = 1e-5, 1e3  # scores drawn; what lies beyond stands at the edge
+OF_THE_PAGE = {INK: "--ink", "#000000": "--ink", SOFT: "--soft", "#ffffff": "--paper", BAND: "--band"}
 QUANTILES = (0, 1, 5, 25, 50, 75, 95, 99, 100)
 
 plt.rcParams.update({"svg.fonttype": "none", "svg.hashsalt": "decant", "font.size": 8,
@@ -22,8 +24,13 @@ plt.rcParams.update({"svg.fonttype": "none", "svg.hashsalt": "decant", "font.siz
                      "xtick.color": INK, "ytick.color": INK})
 
 
-def inline(figure, label):
-    """The figure as an element of an HTML page."""
+def literal(name):
+    """A name is no formula, whatever it has of dollars."""
+    return name.replace("$", r"\$")
+
+
+def inline(figure, label, prefix):
+    """The figure as an element of an HTML page. `prefix`: of its ids, which matplotlib gives to each figure anew."""
     out = io.StringIO()
     figure.savefig(out, format="svg", metadata={"Date": None})
     plt.close(figure)
@@ -31,6 +38,9 @@ def inline(figure, label):
     svg = svg[svg.index("<svg"):]
     svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
     svg = re.sub(r'\s+xmlns(:\w+)?="[^"]*"', "", svg).replace("xlink:href", "href")
+    svg = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{prefix}-", svg)
+    svg = re.sub(r": (#[0-9a-f]{6})\b",
+                 lambda m: f": var({OF_THE_PAGE[m[1]]})" if m[1] in OF_THE_PAGE else m[0], svg)
     return svg.replace("<svg", f'<svg role="img" aria-label="{label}"', 1)
 
 
@@ -60,10 +70,10 @@ def frame(names, series, label):
     figure, axes = plt.subplots(figsize=(4.7, height * len(names) + 0.9), layout="constrained")
     axes.set_xscale("log")
     axes.axvline(1, color=BEYOND, lw=1, zorder=0)
-    axes.set_yticks(range(len(names)), names, fontsize=7)
+    axes.set_yticks(range(len(names)), [literal(n) for n in names], fontsize=7)
     axes.set_ylim(len(names) - 0.4, -0.6)
     for k in range(1, len(names), 2):
-        axes.axhspan(k - 0.5, k + 0.5, color="#f3f5f7", zorder=-1, lw=0)
+        axes.axhspan(k - 0.5, k + 0.5, color=BAND, zorder=-1, lw=0)
     axes.tick_params(axis="y", length=0)
     axes.spines[["top", "right", "left"]].set_visible(False)
     axes.set_xlabel(label)
@@ -94,11 +104,11 @@ def distribution_plot(rows, backends):
         axes.plot((q[1], q[99]), (y, y), color=colour, lw=0.9, solid_capstyle="butt")
         axes.plot((q[25], q[75]), (y, y), color=colour, lw=2.6, solid_capstyle="butt")
         axes.plot(q[50], y, MARKS[k], color="white", mec=colour, mew=0.9, ms=3.4,
-                  label=None if backend in labelled else backend)
+                  label=None if backend in labelled else literal(backend))
         axes.plot(q[100], y, ">" if q[100] == MOST else "|", color=colour, ms=5, mew=1.1)
         labelled.add(backend)
     finish(figure, axes, LEAST, most)
-    return inline(figure, "score distributions by check and backend"), note
+    return inline(figure, "score distributions by check and backend", "distribution"), note
 
 
 def three_way_plot(rows, backends):
@@ -115,10 +125,10 @@ def three_way_plot(rows, backends):
         axes.plot(plain, y, "o", color="white", mec=INK, mew=0.8, ms=4,
                   label=None if labelled else "sequential fp32")
         axes.plot(score, y, MARKS[k], color=COLOURS[k], ms=3.6,
-                  label=None if backend in labelled else backend)
+                  label=None if backend in labelled else literal(backend))
         labelled.add(backend)
     finish(figure, axes, least, most)
-    return inline(figure, "scores of backends beside sequential fp32"), note
+    return inline(figure, "scores of backends beside sequential fp32", "three-ways"), note
 
 
 def slice_plot(cloud, row):
@@ -160,4 +170,4 @@ def slice_plot(cloud, row):
         bar.outline.set_visible(False)
     figure.legend(*axes.get_legend_handles_labels(), loc="outside upper left", ncols=4,
                   frameon=False, fontsize=7.5, handletextpad=0.3, columnspacing=1.0)
-    return inline(figure, "slice of the scene around the worst particle")
+    return inline(figure, "slice of the scene around the worst particle", "slice")
