@@ -1,4 +1,9 @@
-# How every target is compiled: warnings, exact arithmetic, sanitizers.
+# How every target is compiled: with which compilers, warnings, exact arithmetic, sanitizers.
+
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 12)
+  message(FATAL_ERROR "Decant needs g++ 12 or later (C++20); ${CMAKE_CXX_COMPILER} is "
+    "${CMAKE_CXX_COMPILER_VERSION}. Name another: -D CMAKE_CXX_COMPILER=g++-12")
+endif()
 
 # Warnings of Decant's own sources. Pedantic ones are for g++ and clang alone, because what nvcc
 # hands to the host compiler is not pedantic C++.
