@@ -119,6 +119,8 @@ class Hdf5Writer {
   void attribute(const std::string& object, const std::string& name, const std::vector<std::int64_t>& values);
   /// Fixed-length ASCII, which some readers insist on.
   void ascii_attribute(const std::string& object, const std::string& name, std::string_view text);
+  /// The file's identifier, for what HDF5 can do beyond the above.
+  hid_t id() const { return id_; }
   /// Writes to the disk and renames into place; the last call on a writer.
   void commit();
 

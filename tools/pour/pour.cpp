@@ -16,6 +16,7 @@
 #include "tools/common/stop_watcher.hpp"
 #include "tools/frames/csv_writer.hpp"
 #include "tools/frames/frame_writer.hpp"
+#include "tools/frames/vtkhdf_frames.hpp"
 #include "tools/frames/xdmf.hpp"
 #include "tools/pour/checkpoint.hpp"
 #include "tools/pour/failed_state.hpp"
@@ -370,6 +371,8 @@ void Pour::finish() {
   const std::string data_file = files_.frames.filename().string();
   write_text_file(files_.frames_xdmf, frames_xdmf(layout_, times, data_file));
   write_text_file(files_.walls_xdmf, walls_xdmf(layout_, times, data_file));
+  write_frames_vtkhdf(files_.frames_vtkhdf, layout_, times, data_file);
+  write_walls_vtkhdf(files_.walls_vtkhdf, layout_, times, data_file);
   // Last, because its absence says that all of the above is complete.
   fs::remove(files_.checkpoint);
 }

@@ -2,8 +2,8 @@
 /// One pour from its first frame to its last: solver, audit, frames, timeline, checkpoints. Knows
 /// no command line, so that tests can pour with any backend.
 ///
-/// What lies in the output folder: frames.h5, frames.xdmf, walls.xdmf, timeline.h5, csv/ when all
-/// is done; frames.h5.partial and checkpoint.h5 as long as it is not.
+/// What lies in the output folder: frames.h5, frames and walls as .xdmf and .vtkhdf, timeline.h5,
+/// csv/ when all is done; frames.h5.partial and checkpoint.h5 as long as it is not.
 #pragma once
 
 #include "oracle/backend.hpp"

@@ -42,8 +42,9 @@ void check_pour_folder(const PourOptions& options, const PourFiles& files) {
 void check_room(const PourOptions& options, const PourFiles& files, const FrameLayout& layout,
                 std::int64_t frames_done) {
   const double share = 1.0 - static_cast<double>(frames_done) / static_cast<double>(layout.frames);
-  // Checkpoints: state in double, twice while one replaces the other. Per frame: XDMF and timeline.
-  const std::int64_t beside = 2 * 48 * layout.particles + 4000 * layout.frames;
+  // Checkpoints: state in double, twice while one replaces the other. A vertex a particle. Per frame: XDMF, VTKHDF
+  // and timeline.
+  const std::int64_t beside = (2 * 48 + 16) * layout.particles + 4000 * layout.frames;
   const double needed =
       static_cast<double>(std::max<std::int64_t>(frame_file_bytes(layout) - bytes_on_disk(files.partial), 0) + beside) +
       (options.csv ? share * static_cast<double>(csv_bytes(layout)) : 0.0);

@@ -19,10 +19,13 @@ struct PourFiles {
         timeline(folder / "timeline.h5"),
         frames_xdmf(folder / "frames.xdmf"),
         walls_xdmf(folder / "walls.xdmf"),
+        frames_vtkhdf(folder / "frames.vtkhdf"),
+        walls_vtkhdf(folder / "walls.vtkhdf"),
         csv(folder / "csv"),
         failed(folder / "failed-state.h5") {}
 
-  std::filesystem::path frames, partial, checkpoint, timeline, frames_xdmf, walls_xdmf, csv, failed;
+  std::filesystem::path frames, partial, checkpoint, timeline, frames_xdmf, walls_xdmf, frames_vtkhdf, walls_vtkhdf,
+      csv, failed;
 };
 
 /// Refuses a folder that a new pour would overwrite, or that has nothing to resume. Throws InputError.
