@@ -37,14 +37,14 @@ Settings settings_of(std::int64_t cases, const std::set<std::string>& names) {
   return s;
 }
 
-TEST(Genomes, AreTheSameForASeedAndOthersForTheNext) {
+TEST(Cases, AreTheSameForASeedAndOthersForTheNext) {
   for (std::uint64_t seed = 1; seed < 200; ++seed) {
     EXPECT_EQ(random_case(seed), random_case(seed));
     EXPECT_FALSE(random_case(seed) == random_case(seed + 1)) << seed;
   }
 }
 
-TEST(Genomes, MakeSoundScenes) {
+TEST(Cases, MakeSoundScenes) {
   for (std::uint64_t seed = 1; seed <= 500; ++seed) {
     const Fixture f = fixture_of(random_case(seed), "fuzz");
     EXPECT_NO_THROW(check_scene(f.scene, "fuzz")) << seed;
@@ -54,7 +54,7 @@ TEST(Genomes, MakeSoundScenes) {
   }
 }
 
-TEST(Genomes, AreOfAllKindsThatPortsTripOver) {
+TEST(Cases, AreOfAllKindsThatPortsTripOver) {
   constexpr int count = 600;
   std::array<int, tag_names.size()> seen{};
   for (std::uint64_t seed = 1; seed <= count; ++seed) {

@@ -53,7 +53,7 @@ std::string fuzz_faults(const nlohmann::json& faults, Executor executor, int job
     return campaign_text(backends_of(planted[k]), executor, most_cases, first_seed);
   });
   std::string table = fmt::format("{:<26} {:<22} {:>8} {:>10} {:>8} {:>6}  {}\n", "fault", "backend", "problems",
-                                  "particles", "shrunk", "tries", "property; what is wrong");
+                                  "particles", "minimised", "tries", "property; what is wrong");
   std::size_t count = 0;
   std::vector<long> cases;
   for (std::size_t k = 0; k < planted.size(); ++k) {

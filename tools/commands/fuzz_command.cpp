@@ -25,7 +25,7 @@ struct FuzzArguments {
   std::int64_t cases = -1;
   double seconds = 0;
   int threads = 0, most_counterexamples = 16;
-  bool no_shrink = false, quiet = false, write = false;
+  bool no_minimising = false, quiet = false, write = false;
 };
 
 std::string footer() {
@@ -85,7 +85,7 @@ void run(FuzzArguments& arguments, int& exit_status) {
   settings.threads =
       arguments.threads > 0 ? arguments.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   settings.most_counterexamples = arguments.most_counterexamples;
-  settings.minimise_tries = arguments.no_shrink ? 0 : 2000;
+  settings.minimise_tries = arguments.no_minimising ? 0 : 2000;
   settings.failures = arguments.failures;
   const StopSignal signal;
   settings.stop = [] { return StopSignal::caught() != 0; };
@@ -138,10 +138,12 @@ void add_fuzz_command(CLI::App& app, int& exit_status) {
       ->capture_default_str();
   verb.add_option("--report", arguments->report, "HDF5 file (oracle/formats/fuzz.md)");
   verb.add_option("--failures", arguments->failures, "folder for what fails")->capture_default_str();
-  verb.add_option("--most-findings", arguments->most_counterexamples, "findings after which to stop")
+  verb.add_option("--most-findings", arguments->most_counterexamples)->check(CLI::Range(1, 10000))->group("");
+  verb.add_flag("--no-shrink", arguments->no_minimising)->group("");
+  verb.add_option("--most-counterexamples", arguments->most_counterexamples, "counterexamples after which to stop")
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
-  verb.add_flag("--no-shrink", arguments->no_shrink, "failures are kept as they are found");
+  verb.add_flag("--no-minimise", arguments->no_minimising, "save failures as they are found");
   verb.add_flag("--write", arguments->write,
                 "only write the problem of --seed into --failures, to look at what a report calls worst");
   verb.add_flag("--quiet", arguments->quiet, "no progress on standard error");

@@ -113,7 +113,7 @@ inline constexpr int fine = 64;
 Case random_case(std::uint64_t seed);
 
 /// The problem; no recorded fields and no ensemble. Throws InputError where the scene is none: minimising
-/// tries such genomes.
+/// tries such cases.
 Fixture fixture_of(const Case& fuzz_case, const std::string& name);
 
 /// What a problem has that ports trip over, by name, in this order.
