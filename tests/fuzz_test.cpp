@@ -1,5 +1,5 @@
 /// \file
-/// Fuzzing itself: problems are sound and of all kinds, faults are found and minimised, campaigns are the
+/// Fuzzing itself: cases are sound and of all kinds, faults are found and minimised, campaigns are the
 /// same however they are run.
 #include "oracle/files/fixture_file.hpp"
 #include "tools/fuzz/campaign.hpp"
@@ -62,7 +62,7 @@ TEST(Cases, AreOfAllKindsThatPortsTripOver) {
     for (std::size_t k = 0; k < c.size(); ++k) seen[k] += c[k];
   }
   for (std::size_t k = 0; k < seen.size(); ++k) {
-    // No kind is so rare that a thousand problems could miss it, and none is all there is.
+    // No kind is so rare that a thousand cases could miss it, and none is all there is.
     EXPECT_GT(seen[k], count / 50) << tag_names[k];
     EXPECT_LT(seen[k], count * 19 / 20) << tag_names[k];
   }

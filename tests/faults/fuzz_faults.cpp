@@ -1,5 +1,5 @@
 /// \file
-/// A campaign a fault: how many problems it takes, and what is left of the one that shows it.
+/// A campaign a fault: how many cases it takes, and what is left of the one that shows it.
 #include "tests/faults/fuzz_faults.hpp"
 
 #include "tests/faults/trials.hpp"
@@ -52,7 +52,7 @@ std::string fuzz_faults(const nlohmann::json& faults, Executor executor, int job
     choose_fault(executor, planted[k]["number"].get<int>());
     return campaign_text(backends_of(planted[k]), executor, most_cases, first_seed);
   });
-  std::string table = fmt::format("{:<26} {:<22} {:>8} {:>10} {:>8} {:>6}  {}\n", "fault", "backend", "problems",
+  std::string table = fmt::format("{:<26} {:<22} {:>8} {:>10} {:>8} {:>6}  {}\n", "fault", "backend", "cases",
                                   "particles", "minimised", "tries", "property; what is wrong");
   std::size_t count = 0;
   std::vector<long> cases;
@@ -75,7 +75,7 @@ std::string fuzz_faults(const nlohmann::json& faults, Executor executor, int job
   }
   std::sort(cases.begin(), cases.end());
   table +=
-      fmt::format("{} of {} found within {} problems of seeds from {}", count, planted.size(), most_cases, first_seed);
+      fmt::format("{} of {} found within {} cases of seeds from {}", count, planted.size(), most_cases, first_seed);
   if (!cases.empty()) table += fmt::format("; median {}, most {}", cases[cases.size() / 2], cases.back());
   all_found = count == planted.size();
   return table + "\n";

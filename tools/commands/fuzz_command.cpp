@@ -1,5 +1,5 @@
 /// \file
-/// `decant fuzz`: random problems held to properties.
+/// `decant fuzz`: property-based tests on random scenes.
 #include "reference/error.hpp"
 #include "tools/commands/backend_choice.hpp"
 #include "tools/commands/commands.hpp"
@@ -35,7 +35,7 @@ std::string footer() {
       "reports. What fails is minimised and written as a fixture, which `decant conform` shows again, with\n"
       "its scene beside it. Ctrl-C ends a campaign and keeps what it found: exit status 130.\n"
       "\n"
-      "Properties; where none is named, the expensive ones are asked of every 2nd, 4th or 8th problem:\n";
+      "Properties; where none is named, the expensive ones are asked of every 2nd, 4th or 8th case:\n";
   for (const fuzz::Property& p : fuzz::properties()) text += fmt::format("  {:<13} {}\n", p.name, p.sentence);
   return text +
          "Exit status: 0 all hold, 1 a property does not hold, 2 bad input, 77 the device of\n"
@@ -64,8 +64,8 @@ std::set<std::string> chosen(const std::vector<std::string>& given) {
 void run(FuzzArguments& arguments, int& exit_status) {
   if (arguments.write) {
     const std::string seed = fmt::format("{}", arguments.seed);
-    fmt::print("decant conform {}\n", fuzz::write_problem(arguments.failures, fuzz::random_case(arguments.seed),
-                                                          "fuzz-" + seed, {{"fuzz_seed", seed}}));
+    fmt::print("decant conform {}\n", fuzz::write_case(arguments.failures, fuzz::random_case(arguments.seed),
+                                                       "fuzz-" + seed, {{"fuzz_seed", seed}}));
     return;
   }
   if (arguments.cases < 0 && arguments.seconds <= 0) arguments.cases = 1000;
@@ -78,7 +78,7 @@ void run(FuzzArguments& arguments, int& exit_status) {
   fuzz::Settings settings;
   settings.backends = arguments.backends;
   settings.properties = chosen(arguments.properties);
-  settings.every_problem = !arguments.properties.empty();
+  settings.every_case = !arguments.properties.empty();
   settings.first_seed = arguments.seed;
   settings.cases = arguments.cases;
   settings.seconds = arguments.seconds;
@@ -91,7 +91,7 @@ void run(FuzzArguments& arguments, int& exit_status) {
   settings.stop = [] { return StopSignal::caught() != 0; };
   fuzz::Campaign result;
   {
-    Progress progress("problem", std::max<std::int64_t>(arguments.cases, 1), 0, arguments.quiet || arguments.cases < 0);
+    Progress progress("case", std::max<std::int64_t>(arguments.cases, 1), 0, arguments.quiet || arguments.cases < 0);
     settings.progress = [&](const fuzz::Campaign& now) {
       double worst = 0;
       std::int64_t failed = 0;
@@ -102,7 +102,7 @@ void run(FuzzArguments& arguments, int& exit_status) {
       const std::string note = fmt::format("{:.0f} per second, worst score {:.3f}, {} failures",
                                            static_cast<double>(now.cases) / now.seconds, worst, failed);
       if (arguments.cases >= 0) progress.update(now.cases, note);
-      else if (!arguments.quiet) fmt::print(stderr, "\r{:.0f} s, {} problems, {}  ", now.seconds, now.cases, note);
+      else if (!arguments.quiet) fmt::print(stderr, "\r{:.0f} s, {} cases, {}  ", now.seconds, now.cases, note);
     };
     result = fuzz::run_campaign(settings, make);
     if (arguments.cases < 0 && !arguments.quiet) fmt::print(stderr, "\n");
@@ -113,7 +113,7 @@ void run(FuzzArguments& arguments, int& exit_status) {
                                  [](const fuzz::PropertyStatistics& t) { return t.failed == 0; });
   exit_status = holds ? exit_pass : exit_does_not_conform;
   if (StopSignal::caught() == 0) return;
-  fmt::print("interrupted: {} problems asked\n", result.cases);
+  fmt::print("interrupted: {} cases asked\n", result.cases);
   exit_status = 128 + StopSignal::caught();
 }
 
@@ -127,13 +127,13 @@ void add_fuzz_command(CLI::App& app, int& exit_status) {
       ->capture_default_str();
   verb.add_option("--executor", arguments->executor, "cuda, host, or auto: the GPU where there is one")
       ->capture_default_str();
-  verb.add_option("--property", arguments->properties, "by name, each asked of every problem; all where none is given")
+  verb.add_option("--property", arguments->properties, "by name, each asked of every case; all where none is given")
       ->delimiter(',');
-  verb.add_option("--cases", arguments->cases, "problems; 1000 where neither this nor --seconds is given")
+  verb.add_option("--cases", arguments->cases, "how many; 1000 where neither this nor --seconds is given")
       ->check(CLI::Range(std::int64_t{1}, std::int64_t{1} << 40));
-  verb.add_option("--seconds", arguments->seconds, "time after which no problem is begun");
-  verb.add_option("--seed", arguments->seed, "of the first problem")->capture_default_str();
-  verb.add_option("--threads", arguments->threads, "problems at a time; 0: as many as there are cores")
+  verb.add_option("--seconds", arguments->seconds, "time after which no case is begun");
+  verb.add_option("--seed", arguments->seed, "of the first case")->capture_default_str();
+  verb.add_option("--threads", arguments->threads, "cases at a time; 0: as many as there are cores")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
   verb.add_option("--report", arguments->report, "HDF5 file (oracle/formats/fuzz.md)");
@@ -145,7 +145,7 @@ void add_fuzz_command(CLI::App& app, int& exit_status) {
       ->capture_default_str();
   verb.add_flag("--no-minimise", arguments->no_minimising, "save failures as they are found");
   verb.add_flag("--write", arguments->write,
-                "only write the problem of --seed into --failures, to look at what a report calls worst");
+                "only write the case of --seed into --failures, to look at what a report calls worst");
   verb.add_flag("--quiet", arguments->quiet, "no progress on standard error");
   verb.footer(footer());
   verb.callback([arguments, &exit_status] { run(*arguments, exit_status); });

@@ -64,7 +64,7 @@ class Running {
   void work() {
     try {
       if (s_.one_core_each) omp_set_num_threads(1);
-      Tester tester(s_.backends, s_.properties, make_, s_.every_problem);
+      Tester tester(s_.backends, s_.properties, make_, s_.every_case);
       for (;;) {
         // Seeds are consecutive: whoever takes one has it done.
         const std::int64_t k = next_.fetch_add(1);
@@ -142,8 +142,8 @@ class Running {
 
 Campaign run_campaign(const Settings& settings, const BackendMaker& make) { return Running(settings, make).run(); }
 
-std::string write_problem(const std::filesystem::path& folder, const Case& fuzz_case, const std::string& name,
-                          const std::map<std::string, std::string>& provenance) {
+std::string write_case(const std::filesystem::path& folder, const Case& fuzz_case, const std::string& name,
+                       const std::map<std::string, std::string>& provenance) {
   std::filesystem::create_directories(folder);
   Fixture fixture = fixture_of(fuzz_case, name);
   fixture.provenance = build_provenance();
@@ -159,12 +159,12 @@ std::string write_finding(const std::filesystem::path& folder, const Counterexam
   std::string backend = counterexample.outcome.backend;
   for (char& c : backend)
     if (c == ':' || c == '=') c = '-';
-  return write_problem(folder, counterexample.fuzz_case,
-                       fmt::format("fuzz-{}-{}-{}", counterexample.seed, backend, counterexample.outcome.property),
-                       {{"fuzz_seed", fmt::format("{}", counterexample.seed)},
-                        {"fuzz_property", counterexample.outcome.property},
-                        {"fuzz_backend", counterexample.outcome.backend},
-                        {"fuzz_reason", counterexample.outcome.reason}});
+  return write_case(folder, counterexample.fuzz_case,
+                    fmt::format("fuzz-{}-{}-{}", counterexample.seed, backend, counterexample.outcome.property),
+                    {{"fuzz_seed", fmt::format("{}", counterexample.seed)},
+                     {"fuzz_property", counterexample.outcome.property},
+                     {"fuzz_backend", counterexample.outcome.backend},
+                     {"fuzz_reason", counterexample.outcome.reason}});
 }
 
 }  // namespace decant::fuzz

@@ -1,5 +1,5 @@
 /// \file
-/// A fuzzing campaign: problems from consecutive seeds, held to properties; what fails is minimised, written
+/// A fuzzing campaign: cases from consecutive seeds, held to properties; what fails is minimised, written
 /// as a fixture that shows it again, and reported.
 #pragma once
 
@@ -17,19 +17,19 @@
 
 namespace decant::fuzz {
 
-/// How long a problem's runs are, and how many perturbed ones say how far correct runs are apart.
+/// How long a case's runs are, and how many perturbed ones say how far correct runs are apart.
 inline constexpr int run_substeps = 8, run_members = 8;
 
-/// A property that every problem has to have.
+/// A property that every case has to have.
 struct Property {
   const char* name;
   const char* sentence;
-  int every;        // of so many problems one is held to it, by its seed
+  int every;        // of so many cases one is held to it, by its seed
   bool of_backend;  // else of the scene alone
 };
 const std::vector<Property>& properties();
 
-/// What one property showed on one problem.
+/// What one property showed on one case.
 struct Outcome {
   std::string backend, property;
   bool holds = true;
@@ -44,12 +44,12 @@ using BackendMaker = std::function<std::unique_ptr<Backend>(const std::string& c
 /// Backends that serve one thread.
 class Tester {
  public:
-  /// \param every_problem  asks each property of every problem, whosever turn it is
+  /// \param every_case  asks each property of every case, whosever turn it is
   Tester(std::vector<std::string> backends, std::set<std::string> properties, BackendMaker make,
-         bool every_problem = false);
+         bool every_case = false);
 
-  /// Holds one problem to all properties whose turn it is. Empty `outcomes`: fp32 cannot tell this
-  /// problem's neighbors apart, and no property is asked.
+  /// Holds one case to all properties whose turn it is. Empty `outcomes`: fp32 cannot tell this
+  /// case's neighbors apart, and no property is asked.
   std::vector<Outcome> test(const Fixture& problem, std::uint64_t seed);
   /// One property of one backend, whosever turn it is.
   Outcome test_one(const Case& fuzz_case, std::uint64_t seed, const Outcome& like);
@@ -62,17 +62,17 @@ class Tester {
   std::vector<std::string> names_;
   std::set<std::string> properties_;
   BackendMaker make_;
-  bool every_problem_;
+  bool every_case_;
   std::vector<std::pair<std::string, std::unique_ptr<Backend>>> made_;
 };
 
 /// A failure and what minimising left of it.
 struct Counterexample {
   std::uint64_t seed = 0;
-  Outcome outcome;  // of the minimised problem
+  Outcome outcome;  // of the minimised case
   Case fuzz_case;   // minimised
   std::size_t found_particles = 0;
-  int tries = 0;     // problems tried while minimising
+  int tries = 0;     // cases tried while minimising
   std::string file;  // the fixture written; empty: none
 };
 
@@ -80,7 +80,7 @@ struct Counterexample {
 /// Ends after so many tries or seconds.
 Counterexample minimise(Tester& tester, Counterexample found, int most_tries, double seconds = 20);
 
-/// Scores of a property of a backend over all problems.
+/// Scores of a property of a backend over all cases.
 struct PropertyStatistics {
   std::string backend, property;
   std::int64_t asked = 0, failed = 0;
@@ -93,7 +93,7 @@ struct PropertyStatistics {
 struct Settings {
   std::vector<std::string> backends;
   std::set<std::string> properties;
-  bool every_problem = false;  // properties are asked of every problem, whosever turn it is
+  bool every_case = false;  // properties are asked of every case, whosever turn it is
   std::uint64_t first_seed = 1;
   std::int64_t cases = 1000;  // of consecutive seeds; < 0: as many as there is time for
   double seconds = 0;         // 0: no limit
@@ -108,7 +108,7 @@ struct Settings {
 
 struct Campaign {
   std::uint64_t first_seed = 0;
-  std::int64_t cases = 0;        // problems drawn, consecutive
+  std::int64_t cases = 0;        // cases drawn, consecutive
   std::int64_t undecidable = 0;  // of them, not held to anything
   double seconds = 0;
   std::array<std::int64_t, tag_names.size()> tags{};
@@ -119,10 +119,10 @@ struct Campaign {
 /// Runs. The same seeds give the same statistics, whatever the number of threads.
 Campaign run_campaign(const Settings& settings, const BackendMaker& make);
 
-/// Writes a problem with the oracle's answer, for `decant conform`, and its scene beside it; returns the
+/// Writes a case with the oracle's answer, for `decant conform`, and its scene beside it; returns the
 /// fixture's file.
-std::string write_problem(const std::filesystem::path& folder, const Case& fuzz_case, const std::string& name,
-                          const std::map<std::string, std::string>& provenance);
+std::string write_case(const std::filesystem::path& folder, const Case& fuzz_case, const std::string& name,
+                       const std::map<std::string, std::string>& provenance);
 std::string write_finding(const std::filesystem::path& folder, const Counterexample& counterexample);
 
 /// Table for people.

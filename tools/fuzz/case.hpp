@@ -1,5 +1,5 @@
 /// \file
-/// A fuzzed problem as whole numbers: a small scene and a state in it, positions and velocities on
+/// A fuzzed case as whole numbers: a small scene and a state in it, positions and velocities on
 /// lattices, so that faces of cells, coincidences and exact distances come up, and so that minimising
 /// has somewhere to go: every number may come nearer to 0, every particle and container may leave.
 ///
@@ -112,11 +112,11 @@ inline constexpr int fine = 64;
 /// A case and its kind of state. The same seed gives the same on every machine.
 Case random_case(std::uint64_t seed);
 
-/// The problem; no recorded fields and no ensemble. Throws InputError where the scene is none: minimising
+/// The case; no recorded fields and no ensemble. Throws InputError where the scene is none: minimising
 /// tries such cases.
 Fixture fixture_of(const Case& fuzz_case, const std::string& name);
 
-/// What a problem has that ports trip over, by name, in this order.
+/// What a case has that ports trip over, by name, in this order.
 inline constexpr std::array<const char*, 24> tag_names = {"walls",
                                                           "moving wall",
                                                           "belt",

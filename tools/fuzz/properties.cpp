@@ -212,12 +212,11 @@ const std::vector<Property>& properties() {
   return all;
 }
 
-Tester::Tester(std::vector<std::string> backends, std::set<std::string> properties, BackendMaker make,
-               bool every_problem)
+Tester::Tester(std::vector<std::string> backends, std::set<std::string> properties, BackendMaker make, bool every_case)
     : names_(std::move(backends)),
       properties_(std::move(properties)),
       make_(std::move(make)),
-      every_problem_(every_problem) {}
+      every_case_(every_case) {}
 
 Backend& Tester::backend(const std::string& choice) {
   for (auto& [name, made] : made_)
@@ -228,8 +227,7 @@ Backend& Tester::backend(const std::string& choice) {
 std::vector<Outcome> Tester::test(const Fixture& problem, std::uint64_t seed) {
   std::set<std::string> wanted;
   for (const Property& property : properties())
-    if (properties_.contains(property.name) &&
-        (every_problem_ || seed % static_cast<std::uint64_t>(property.every) == 0))
+    if (properties_.contains(property.name) && (every_case_ || seed % static_cast<std::uint64_t>(property.every) == 0))
       wanted.insert(property.name);
   return outcomes(problem, seed, {names_.begin(), names_.end()}, wanted);
 }

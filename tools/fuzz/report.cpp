@@ -30,8 +30,8 @@ std::vector<std::string> texts(const Rows& rows, Get get) {
 
 std::string campaign_table(const Campaign& c) {
   std::string text = fmt::format(
-      "{} problems of seeds {} to {} in {:.1f} s, {:.0f} per second; {} with pairs so near H that fp32\n"
-      "cannot tell who is a neighbor\n\nshare of problems with",
+      "{} cases of seeds {} to {} in {:.1f} s, {:.0f} per second; {} with pairs so near H that fp32\n"
+      "cannot tell who is a neighbor\n\nshare of cases with",
       c.cases, c.first_seed, c.first_seed + static_cast<std::uint64_t>(c.cases) - 1, c.seconds,
       static_cast<double>(c.cases) / c.seconds, c.undecidable);
   for (std::size_t k = 0; k < tag_names.size(); ++k)

@@ -1,5 +1,5 @@
 /// \file
-/// What a problem has, for tables and for people.
+/// What a case has, for tables and for people.
 #include "tools/fuzz/case.hpp"
 
 #include "reference/distance.hpp"
