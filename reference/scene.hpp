@@ -22,6 +22,9 @@ namespace decant {
 using Vec3 = Eigen::Vector3d;
 
 enum class KernelFamily { cubic_spline, wendland_c2, mueller2003 };
+/// As scenes and files name them.
+inline constexpr std::array<const char*, 3> kernel_names = {"cubic_spline", "wendland_c2", "mueller2003"};
+inline const char* to_string(KernelFamily family) { return kernel_names.at(static_cast<std::size_t>(family)); }
 
 /// Material of the fluid, and the walls' share of its viscosity.
 struct FluidProperties {

@@ -302,7 +302,7 @@ Scene parse_scene(std::string_view text, const std::string& file) {
   scene.name = v["name"].name();
   scene.particle_spacing = v["particle_spacing"].number({.low = 1e-6, .high = 1e3});
   if (v.has("kernel"))
-    scene.kernel = static_cast<KernelFamily>(v["kernel"].choice({"cubic_spline", "wendland_c2", "mueller2003"}));
+    scene.kernel = static_cast<KernelFamily>(v["kernel"].choice({kernel_names.begin(), kernel_names.end()}));
   if (v.has("support_ratio")) scene.support_ratio = v["support_ratio"].number({.low = 1.5, .high = 5.0});
   if (v.has("mass_ratio")) scene.mass_ratio = v["mass_ratio"].number({.low = 0.5, .high = 2.0});
   scene.fluid = read_fluid(v["fluid"]);

@@ -14,18 +14,6 @@ json vector_json(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
 json box_json(const SolidBox& box) { return {{"min", vector_json(box.min)}, {"max", vector_json(box.max)}}; }
 
-const char* kernel_name(KernelFamily family) {
-  switch (family) {
-    case KernelFamily::cubic_spline:
-      return "cubic_spline";
-    case KernelFamily::wendland_c2:
-      return "wendland_c2";
-    case KernelFamily::mueller2003:
-      return "mueller2003";
-  }
-  return "";
-}
-
 json oscillation_json(json amplitude, double frequency, double phase) {
   return {{"amplitude", std::move(amplitude)}, {"frequency", frequency}, {"phase", phase}};
 }
@@ -96,7 +84,7 @@ std::string scene_to_json(const Scene& scene) {
   out["decant_scene"] = 1;
   out["name"] = scene.name;
   out["particle_spacing"] = scene.particle_spacing;
-  out["kernel"] = kernel_name(scene.kernel);
+  out["kernel"] = to_string(scene.kernel);
   out["support_ratio"] = scene.support_ratio;
   out["mass_ratio"] = scene.mass_ratio;
   const auto& fluid = scene.fluid;

@@ -10,22 +10,10 @@
 namespace decant {
 namespace {
 
-const char* name_of(KernelFamily family) {
-  switch (family) {
-    case KernelFamily::cubic_spline:
-      return "cubic_spline";
-    case KernelFamily::wendland_c2:
-      return "wendland_c2";
-    case KernelFamily::mueller2003:
-      return "mueller2003";
-  }
-  return "";
-}
-
 void write_scene(Hdf5Writer& out, const Scene& scene) {
   out.text("/scene/json", scene_to_json(scene), "all of the scene as canonical JSON");
   const auto real = [&](const char* name, double value) { out.attribute("/scene", name, value); };
-  out.attribute("/scene", "kernel", name_of(scene.kernel));
+  out.attribute("/scene", "kernel", to_string(scene.kernel));
   real("particle_spacing", scene.particle_spacing);
   real("support_radius", scene.support_radius());
   real("particle_mass", scene.particle_mass());

@@ -108,9 +108,7 @@ std::string describe(const Case& g) {
     if (v.belt != std::array<int, 3>{}) text += " that runs like a belt";
   }
   if (g.reversed) text += ", listed from the last on";
-  text += fmt::format(", {}, H = {:.1f} dx",
-                      std::array{"cubic_spline", "wendland_c2", "mueller2003"}[static_cast<std::size_t>(g.kernel)],
-                      (16 + g.support) / 10.0);
+  text += fmt::format(", {}, H = {:.1f} dx", kernel_names[static_cast<std::size_t>(g.kernel)], (16 + g.support) / 10.0);
   if (g.mass) text += fmt::format(", mass ratio {:.2f}", (100 + g.mass) / 100.0);
   if (g.rest_density) text += fmt::format(", rest density {}", 1000 + 100 * g.rest_density);
   if (g.sound_speed) text += fmt::format(", c0 = {} m/s", 10 + g.sound_speed);
