@@ -7,6 +7,7 @@
 
 #include "oracle/files/hdf5_handle.hpp"
 #include "oracle/files/hdf5_io.hpp"
+#include "oracle/files/vtkhdf.hpp"
 
 #include <fmt/format.h>
 #include <hdf5.h>
@@ -20,7 +21,7 @@ namespace {
 
 using Shape = std::vector<hsize_t>;
 
-const std::string root = "/VTKHDF";
+const std::string& root = vtkhdf_root;
 constexpr hsize_t topologies = 4;  // Vertices, Lines, Polygons, Strips
 
 IdVector one(std::int64_t value) { return IdVector::Constant(1, value); }
@@ -42,23 +43,6 @@ class VtkHdf {
 
   Hdf5Writer& out() { return out_; }
   std::int64_t frames() const { return times_.size(); }
-
-  void begin(const std::string& group, const char* type, std::int64_t minor_version) {
-    out_.attribute(group, "Version", std::vector<std::int64_t>{2, minor_version});
-    out_.ascii_attribute(group, "Type", type);
-  }
-
-  /// `cells` cells of `points` points each; their points are left to the caller.
-  void cells(const std::string& group, std::int64_t cells, std::int64_t points) {
-    out_.integers(group + "/NumberOfCells", one(cells));
-    out_.integers(group + "/NumberOfConnectivityIds", one(cells * points));
-    out_.integers(group + "/Offsets", IdVector::LinSpaced(cells + 1, 0, cells * points));
-  }
-
-  void no_cells(const std::string& group) {
-    cells(group, 0, 0);
-    out_.integers(group + "/Connectivity", IdVector());
-  }
 
   /// Where each step starts. \param point_offsets  its first point, a step each; \param arrays  of the points
   void steps(const std::string& group, const IdVector& point_offsets, const std::vector<std::string>& arrays) {
@@ -131,12 +115,12 @@ void write_wall(VtkHdf& file, const std::string& group, const RenderWall& wall) 
   const std::int64_t steps = wall.moving ? file.frames() : 1;
   const auto vertices = static_cast<hsize_t>(wall.surface.vertex.cols());
   const hsize_t rows = static_cast<hsize_t>(steps) * vertices, triangles = wall.surface.triangle.size();
-  file.begin(group, "PolyData", 0);
+  begin_vtkhdf(file.out(), group, "PolyData", 0);
   file.out().integers(group + "/NumberOfPoints", one(wall.surface.vertex.cols()));
   file.shown(group + "/Points", H5T_IEEE_F32LE, {rows, 3}, source + "/vertex",
              wall.moving ? Shape{static_cast<hsize_t>(steps), vertices, 3} : Shape{vertices, 3}, "m");
-  for (const char* kind : {"/Vertices", "/Lines", "/Strips"}) file.no_cells(group + kind);
-  file.cells(group + "/Polygons", static_cast<std::int64_t>(triangles), 3);
+  for (const char* kind : {"/Vertices", "/Lines", "/Strips"}) write_vtkhdf_vertices(file.out(), group + kind, 0);
+  write_vtkhdf_cells(file.out(), group + "/Polygons", static_cast<std::int64_t>(triangles), 3);
   // In the type of Offsets, which VTK before 9.6 insists on.
   file.shown(group + "/Polygons/Connectivity", H5T_STD_I64LE, {3 * triangles}, source + "/triangle", {triangles, 3},
              "");
@@ -166,12 +150,11 @@ void write_frames_vtkhdf(const std::filesystem::path& file, const FrameLayout& l
     if (vector) vtk.shown(path, type, {t * particles, 3}, source, {t, particles, 3}, unit);
     else vtk.shown(path, type, {t * particles}, source, {t, particles}, unit);
   };
-  vtk.begin(root, "PolyData", 0);
+  begin_vtkhdf(vtk.out(), root, "PolyData", 0);
   vtk.out().integers(root + "/NumberOfPoints", one(n));
   shown(root + "/Points", "/fluid/position", H5T_IEEE_F32LE, true, "m");
-  vtk.cells(root + "/Vertices", n, 1);
-  vtk.out().integers(root + "/Vertices/Connectivity", IdVector::LinSpaced(n, 0, n - 1));
-  for (const char* kind : {"/Lines", "/Polygons", "/Strips"}) vtk.no_cells(root + kind);
+  write_vtkhdf_vertices(vtk.out(), root + "/Vertices", n);
+  for (const char* kind : {"/Lines", "/Polygons", "/Strips"}) write_vtkhdf_vertices(vtk.out(), root + kind, 0);
   std::vector<std::string> names;
   for (const Array& array : arrays) {
     const std::string name = array.name;
@@ -186,7 +169,7 @@ void write_walls_vtkhdf(const std::filesystem::path& file, const FrameLayout& la
                         const std::string& data_file) {
   VtkHdf vtk(file, layout, times, data_file);
   vtk.ordered_group(root);
-  vtk.begin(root, "PartitionedDataSetCollection", 1);
+  begin_vtkhdf(vtk.out(), root, "PartitionedDataSetCollection", 1);
   vtk.ordered_group(root + "/Assembly");
   for (std::size_t w = 0; w < layout.walls.size(); ++w) {
     // VTK's assembly takes no name that begins with a digit, and the collection has members of its own.
