@@ -16,13 +16,6 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-double score_of(double error, double tolerance) {
-  if (!(tolerance >= 0 && tolerance < infinity)) return infinity;
-  if (error == 0) return 0;
-  const double score = error / tolerance;
-  return score >= 0 ? score : infinity;  // NaN, whatever made it
-}
-
 void compare(const Values& v, CheckRow& row) {
   const auto n = v.expected.size();
   if (v.actual.size() != n) {

@@ -14,9 +14,6 @@
 
 namespace decant {
 
-/// Error over tolerance; a tolerance of 0 asks for equality; infinite where either is no number.
-double score_of(double error, double tolerance);
-
 /// Values of one field, particle by particle, `components` a particle.
 struct Values {
   Eigen::VectorXd actual, expected, tolerance;

@@ -61,7 +61,7 @@ struct Figures {
 
 Figures figures_of(const CheckRow& row, Eigen::Index particle, Eigen::Index particles) {
   Figures worst;
-  if (row.errors.size() == 0 || row.errors.size() != row.tolerances.size() || row.errors.size() % particles != 0) {
+  if (!has_arrays(row) || row.errors.size() % particles != 0) {
     if (particle == row.worst_id) worst = {row.error, row.tolerance, row.score};
     return worst;
   }

@@ -12,14 +12,17 @@ namespace decant {
 
 bool has_arrays(const CheckRow& row) { return row.errors.size() > 0 && row.errors.size() == row.tolerances.size(); }
 
+double score_of(double error, double tolerance) {
+  if (!(tolerance >= 0 && tolerance < std::numeric_limits<double>::infinity()))
+    return std::numeric_limits<double>::infinity();
+  if (error == 0) return 0;
+  const double score = error / tolerance;
+  return score >= 0 ? score : std::numeric_limits<double>::infinity();  // NaN, whatever made it
+}
+
 Eigen::VectorXd scores_of(const CheckRow& row) {
-  Eigen::VectorXd scores(row.errors.size());
-  for (Eigen::Index k = 0; k < scores.size(); ++k) {
-    const double error = std::abs(row.errors[k]);
-    const double score = error == 0 && row.tolerances[k] == 0 ? 0 : error / row.tolerances[k];
-    scores[k] = std::isnan(score) ? std::numeric_limits<double>::infinity() : score;
-  }
-  return scores;
+  return row.errors.binaryExpr(row.tolerances,
+                               [](double error, double tolerance) { return score_of(std::abs(error), tolerance); });
 }
 
 std::vector<double> quantiles_of(const CheckRow& row) {

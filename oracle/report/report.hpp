@@ -91,8 +91,10 @@ std::string reason_of(const CheckRow& row);
 /// Whether the row has its per-particle errors and their tolerances.
 bool has_arrays(const CheckRow& row);
 
-/// |error| / tolerance per value; 0 where both are 0, infinite where only the tolerance is. NaN counts as
-/// infinite, so that it sorts as the worst.
+/// Error over tolerance; a tolerance of 0 asks for equality; infinite where either is no number.
+double score_of(double error, double tolerance);
+
+/// score_of each value's |error|.
 Eigen::VectorXd scores_of(const CheckRow& row);
 
 /// Nearest-rank quantiles of the scores, of quantile_percent; what the row already has, or NaN, where it has no
