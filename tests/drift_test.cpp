@@ -9,6 +9,7 @@
 #include "tests/falling_points.hpp"
 #include "tests/python.hpp"
 #include "tests/random_scene.hpp"
+#include "tests/temporary_folder.hpp"
 #include "tools/commands/backend_choice.hpp"
 
 #include <gtest/gtest.h>

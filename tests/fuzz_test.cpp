@@ -2,6 +2,7 @@
 /// Fuzzing itself: cases are sound and of all kinds, faults are found and minimised, campaigns are the
 /// same however they are run.
 #include "oracle/files/fixture_file.hpp"
+#include "tests/temporary_folder.hpp"
 #include "tools/fuzz/campaign.hpp"
 
 #include "oracle/checks/conform.hpp"
@@ -10,7 +11,6 @@
 #include "reference/error.hpp"
 #include "reference/scene_checks.hpp"
 #include "tests/edited_reference.hpp"
-#include "tests/falling_points.hpp"
 #include "tests/python.hpp"
 #include "tools/commands/backend_choice.hpp"
 

@@ -2,6 +2,7 @@
 /// Files appear whole or not at all, come back bitwise, and are never believed.
 #include "oracle/files/hdf5_io.hpp"
 #include "reference/error.hpp"
+#include "tests/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 
@@ -23,19 +24,12 @@ namespace fs = std::filesystem;
 
 class Hdf5Io : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string pattern = (fs::temp_directory_path() / "decant-hdf5-XXXXXX").string();
-    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
   fs::path at(const std::string& name) const { return folder_ / name; }
   std::size_t files() const {
-    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_.path()), fs::directory_iterator()));
   }
 
-  fs::path folder_;
+  test::TemporaryFolder folder_;
 };
 
 std::string bytes_of(const fs::path& file) {
@@ -191,7 +185,7 @@ TEST_F(Hdf5Io, AFolderThatIsMissingIsAnErrorThatNamesTheFile) {
     EXPECT_NE(std::string(error.what()).find("no/such/folder.h5: cannot be written: No such file"), std::string::npos)
         << error.what();
   }
-  EXPECT_THROW(Hdf5Writer{folder_}, std::runtime_error);
+  EXPECT_THROW(Hdf5Writer{folder_.path()}, std::runtime_error);
 }
 
 TEST_F(Hdf5Io, AWrongPathClassRankOrLengthIsNamed) {
@@ -298,7 +292,7 @@ TEST_F(Hdf5Io, WhatIsNotAWholeHdf5FileIsRefused) {
   std::ofstream(at("empty.h5")).flush();
   std::ofstream(at("text.h5")) << "{\"name\": \"not HDF5\"}\n";
   EXPECT_EQ(refused([&] { Hdf5Reader in(at("absent.h5")); }).value(), "not found");
-  EXPECT_EQ(refused([&] { Hdf5Reader in(folder_); }).value(), "a folder");
+  EXPECT_EQ(refused([&] { Hdf5Reader in(folder_.path()); }).value(), "a folder");
   EXPECT_EQ(refused([&] { Hdf5Reader in(at("empty.h5")); }).value(), "empty");
   EXPECT_EQ(refused([&] { Hdf5Reader in(at("text.h5")); }).key(), "file");
   for (std::size_t length : {std::size_t{4}, std::size_t{100}, good.size() / 2, good.size() - 1}) {

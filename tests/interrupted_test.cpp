@@ -1,12 +1,12 @@
 /// \file
 /// Long work that is told to stop keeps what it has done.
 #include "oracle/files/report_file.hpp"
+#include "tests/temporary_folder.hpp"
 #include "tools/commands/interruptible.hpp"
 
 #include "oracle/files/file_aside.hpp"
 #include "oracle/files/hdf5_io.hpp"
 #include "oracle/report/report.hpp"
-#include "tests/falling_points.hpp"
 #include "tools/commands/commands.hpp"
 
 #include <gtest/gtest.h>

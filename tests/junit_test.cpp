@@ -3,8 +3,8 @@
 #include "tools/commands/junit.hpp"
 
 #include "oracle/files/file_aside.hpp"
-#include "tests/falling_points.hpp"
 #include "tests/python.hpp"
+#include "tests/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 

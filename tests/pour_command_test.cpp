@@ -1,6 +1,7 @@
 /// \file
 /// A pour that is stopped, killed or failed, and what it leaves behind.
 #include "oracle/files/fixture_file.hpp"
+#include "tests/temporary_folder.hpp"
 #include "tools/pour/pour.hpp"
 
 #include "oracle/files/hdf5_io.hpp"

@@ -5,6 +5,7 @@
 #include "oracle/files/hdf5_io.hpp"
 #include "reference/error.hpp"
 #include "tests/falling_points.hpp"
+#include "tests/temporary_folder.hpp"
 #include "tools/pour/pour.hpp"
 
 #include <gtest/gtest.h>

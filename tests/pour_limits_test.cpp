@@ -6,6 +6,7 @@
 #include "reference/scene_checks.hpp"
 #include "reference/shapes.hpp"
 #include "tests/falling_points.hpp"
+#include "tests/temporary_folder.hpp"
 #include "tools/pour/pour.hpp"
 #include "tools/pour/pour_report.hpp"
 

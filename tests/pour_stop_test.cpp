@@ -9,6 +9,7 @@
 #include "reference/scene_file.hpp"
 #include "tests/falling_points.hpp"
 #include "tests/pour_arguments.hpp"
+#include "tests/temporary_folder.hpp"
 #include "tools/commands/commands.hpp"
 #include "tools/common/stop_signal.hpp"
 #include "tools/pour/checkpoint.hpp"

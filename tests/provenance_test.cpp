@@ -9,6 +9,7 @@
 #include <cctype>
 #include <filesystem>
 #include <fstream>
+#include <regex>
 #include <string>
 #include <vector>
 
@@ -55,6 +56,21 @@ TEST(Provenance, OfEveryCommittedResultInJsonIsARevision) {
     EXPECT_TRUE(is_revision(revision)) << file << ": " << revision;
   }
   EXPECT_GT(results, 5);
+}
+
+TEST(Provenance, OfCommittedTextsNamesNoFolderOfAMachine) {
+  const std::regex folder("(^|[^A-Za-z0-9_.])/(home|mnt|opt|root|srv|tmp|work)/");
+  EXPECT_TRUE(std::regex_search("/home/someone/decant/tests/a.cpp:3: Skipped", folder));
+  EXPECT_FALSE(std::regex_search("tests/a.cpp:3: Skipped, km/h, fixtures/results/h200/work/", folder));
+  int texts = 0;
+  for (const char* extension : {".txt", ".json", ".md"})
+    for (const auto& file : committed(extension)) {
+      ++texts;
+      std::ifstream in(file);
+      for (std::string line; std::getline(in, line);)
+        EXPECT_FALSE(std::regex_search(line, folder)) << file << ": " << line;
+    }
+  EXPECT_GT(texts, 30);
 }
 
 TEST(Provenance, OfAProgramWithChangesIsNoRevision) {

@@ -8,6 +8,7 @@
 #include "tests/forms.hpp"
 #include "tests/python.hpp"
 #include "tests/results_fixture.hpp"
+#include "tests/temporary_folder.hpp"
 
 namespace decant {
 namespace {

@@ -4,7 +4,7 @@
 #include "oracle/files/report_file.hpp"
 
 #include "reference/error.hpp"
-#include "tests/falling_points.hpp"
+#include "tests/temporary_folder.hpp"
 #include "tools/commands/commands.hpp"
 
 #include <gtest/gtest.h>

@@ -2,8 +2,9 @@
 /// The page of tools/python/report_html.py holds what the report does, and needs nothing from elsewhere.
 #include "oracle/files/report_file.hpp"
 #include "oracle/report/report.hpp"
-#include "tests/falling_points.hpp"
+#include "reference/state.hpp"
 #include "tests/python.hpp"
+#include "tests/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 

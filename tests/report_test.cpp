@@ -5,6 +5,7 @@
 #include "oracle/files/report_file.hpp"
 #include "oracle/report/console_table.hpp"
 #include "reference/error.hpp"
+#include "tests/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 #include <hdf5.h>
@@ -62,14 +63,8 @@ CheckRow with_arrays(CheckRow r, Eigen::Index n) {
 
 class ReportFile : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string pattern = (fs::temp_directory_path() / "decant-report-XXXXXX").string();
-    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-    file_ = folder_ / "report.h5";
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-  fs::path folder_, file_;
+  test::TemporaryFolder folder_;
+  const fs::path file_ = folder_ / "report.h5";
 };
 
 TEST_F(ReportFile, TheSummarysColumnsAreOfEqualLength) {

@@ -8,7 +8,7 @@
 #include "oracle/checks/conform.hpp"
 #include "oracle/checks/neighborhood.hpp"
 #include "tests/edited_reference.hpp"
-#include "tests/falling_points.hpp"
+#include "tests/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 

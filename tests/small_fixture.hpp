@@ -10,6 +10,7 @@
 #include "reference/sampling.hpp"
 #include "reference/scene_file.hpp"
 #include "reference/shapes.hpp"
+#include "tests/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 
@@ -79,14 +80,7 @@ inline Fixture small_fixture() {
 
 class FixtureFile : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string pattern = (std::filesystem::temp_directory_path() / "decant-fixture-XXXXXX").string();
-    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-    file_ = folder_ / "beaker-settled.h5";
-    write_fixture(file_, small_fixture());
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
+  void SetUp() override { write_fixture(file_, small_fixture()); }
 
   std::string bytes() const {
     std::ifstream in(file_, std::ios::binary);
@@ -187,7 +181,8 @@ class FixtureFile : public testing::Test {
     }
   }
 
-  std::filesystem::path folder_, file_;
+  test::TemporaryFolder folder_;
+  const std::filesystem::path file_ = folder_ / "beaker-settled.h5";
 };
 
 }  // namespace decant
