@@ -45,7 +45,7 @@ class GridSearch {
                    {walls_have_cells(), !reuses_ && o_.source == SolverOptions::Source::rebuilt,
                     !large(), reach_},
                    scratch_);
-    if (!again || capacity_ == 0) {
+    if (!again) {
       // Whatever was loaded before: a run has the lists that its own problem makes it have.
       const double ratio = !reuses_ ? 1 : 1 + (o_.skin < 0 ? usual : o_.skin);
       capacity_ = o_.capacity ? o_.capacity

@@ -183,7 +183,7 @@ TEST(Lists, VerifiedCountWhatTheOracleCounts) {
     const Fixture f = test::random_fixture(seed);
     const Walls walls = sample_walls(f.scene);
     const WallSolution volumes = wall_solution(f.scene, walls);
-    const StaleList built(f.scene, volumes.volume, look_at(f.scene, walls, volumes, f.state), 0);
+    const StaleList built(f.scene, volumes.volume, instant_of(f.scene, walls, volumes, f.state), 0);
     PairTotals expected;
     for (int age = 0; age < 6; ++age) {
       const auto list = test::make_variant("list:rebuild=6:skin=0", Executor::host);
@@ -191,7 +191,7 @@ TEST(Lists, VerifiedCountWhatTheOracleCounts) {
       ASSERT_TRUE(list->advance(age).ok());
       ParticleState state;
       list->read(state);
-      const Staleness s = built.at(look_at(f.scene, walls, volumes, state));
+      const Staleness s = built.at(instant_of(f.scene, walls, volumes, state));
       expected.pairs += s.fluid.within;
       expected.missed += s.fluid.missed;
       expected.wall_pairs += s.wall.within;

@@ -240,7 +240,7 @@ class Series : public testing::Test {
       ParticleState state = fixture_.state;
       state.substep = k;
       state.position += 0.02 * k * fixture_.scene.particle_spacing * state.velocity;
-      instants_.push_back(look_at(fixture_.scene, walls_, volumes_, state));
+      instants_.push_back(instant_of(fixture_.scene, walls_, volumes_, state));
     }
     out_->attribute("/", "decant_list_series", 1);
   }

@@ -17,7 +17,7 @@ struct Problem {
   explicit Problem(const Fixture& f)
       : scene(f.scene), walls(sample_walls(f.scene)), volumes(wall_solution(f.scene, walls)), state(f.state) {}
 
-  Instant sample() const { return look_at(scene, walls, volumes, state); }
+  Instant sample() const { return instant_of(scene, walls, volumes, state); }
   StaleList list(double skin) const { return {scene, volumes.volume, sample(), skin}; }
 
   Scene scene;

@@ -46,10 +46,10 @@ AuditResult Audit::sample(const ParticleState& state) {
 
   for (Eigen::Index i = 0; i < n; ++i) {
     const Vec3 x = state.position.col(i), v = state.velocity.col(i);
-    auto& place = result.region[static_cast<std::size_t>(i)];
+    auto& region = result.region[static_cast<std::size_t>(i)];
     if (scene_.floor && x.z() - scene_.floor->height < scene_.support_radius())
-      place = static_cast<std::uint8_t>(Region::spilled);
-    if (outside(scene_.domain, x) || !v.allFinite()) place = static_cast<std::uint8_t>(Region::lost);
+      region = static_cast<std::uint8_t>(Region::spilled);
+    if (outside(scene_.domain, x) || !v.allFinite()) region = static_cast<std::uint8_t>(Region::lost);
     result.kinetic_energy += 0.5 * mass * v.squaredNorm();
     result.potential_energy -= mass * scene_.gravity.dot(x);
     // NaN once seen stays.

@@ -135,7 +135,7 @@ std::string ill_posed_reason(const ReferenceSolution& a) {
 namespace {
 
 /// Where a run of the fixture is interrupted, whatever is asked of it: the same run every time.
-std::vector<Segment> stretches_of(const Fixture& fixture, int sample_every) {
+std::vector<Segment> segments_of(const Fixture& fixture, int sample_every) {
   const auto substeps = static_cast<int>(fixture.ensemble.substeps);
   const std::vector<int> viewed = viewed_after(fixture.state.size(), substeps);
   std::set<int> ends(viewed.begin(), viewed.end());
@@ -153,58 +153,58 @@ std::vector<Segment> stretches_of(const Fixture& fixture, int sample_every) {
 }
 
 /// The oracle's own run sampled as a backend's run is.
-void run_ahead(const Fixture& fixture, PreparedReference& j) {
-  Solver solver(fixture.scene, j.walls, fixture.state);
+void run_ahead(const Fixture& fixture, PreparedReference& prepared) {
+  Solver solver(fixture.scene, prepared.walls, fixture.state);
   Audit audit(fixture.scene);
   audit.sample(fixture.state);
   std::int64_t done = 0;
-  for (const Segment& segment : j.segments) {
+  for (const Segment& segment : prepared.segments) {
     for (int k = 0; k < segment.substeps; ++k) solver.substep();
-    if (4 * done < fixture.ensemble.substeps) ++j.repeated;
+    if (4 * done < fixture.ensemble.substeps) ++prepared.repeated;
     done += segment.substeps;
-    j.later_sample = audit.sample(solver.state());
-    j.deepest = std::max(j.deepest, j.later_sample.deepest);
-    j.crossed = std::max(j.crossed, j.later_sample.crossed);
+    prepared.later_sample = audit.sample(solver.state());
+    prepared.deepest = std::max(prepared.deepest, prepared.later_sample.deepest);
+    prepared.crossed = std::max(prepared.crossed, prepared.later_sample.crossed);
   }
-  j.later = solver.state();
+  prepared.later = solver.state();
 }
 
 }  // namespace
 
 PreparedReference prepare_reference(const Fixture& fixture, const CheckSelection& checks, int sample_every) {
   const Scene& scene = fixture.scene;
-  PreparedReference j;
-  j.walls = sample_walls(scene);
-  j.volumes = wall_solution(scene, j.walls);
-  const WallSolution& volumes = j.volumes;
-  j.own = reference_solution(scene, j.walls, volumes, fixture.state);
-  require_reproduced(fixture, j.own);
-  j.inputs.density = j.own.fields.density.cast<float>().cast<double>();
-  j.inputs.pressure = j.own.fields.pressure.cast<float>().cast<double>();
+  PreparedReference prepared;
+  prepared.walls = sample_walls(scene);
+  prepared.volumes = wall_solution(scene, prepared.walls);
+  const WallSolution& volumes = prepared.volumes;
+  prepared.own = reference_solution(scene, prepared.walls, volumes, fixture.state);
+  require_reproduced(fixture, prepared.own);
+  prepared.inputs.density = prepared.own.fields.density.cast<float>().cast<double>();
+  prepared.inputs.pressure = prepared.own.fields.pressure.cast<float>().cast<double>();
   const auto wanted = [&](std::initializer_list<const char*> names) {
     return std::any_of(names.begin(), names.end(), [&](const char* name) { return checks.count(name) > 0; });
   };
   if (wanted({"fields", "conservation"})) {
-    j.given = reference_solution(scene, j.walls, volumes, fixture.state, &j.inputs);
-    j.given_fp32 = fp32_reference_fields(scene, j.walls, volumes, fixture.state, &j.inputs);
+    prepared.given = reference_solution(scene, prepared.walls, volumes, fixture.state, &prepared.inputs);
+    prepared.given_fp32 = fp32_reference_fields(scene, prepared.walls, volumes, fixture.state, &prepared.inputs);
   }
-  if (wanted({"fields"})) j.own_fp32 = fp32_reference_fields(scene, j.walls, volumes, fixture.state);
-  if (wanted({"substep"})) j.substep = substep_solution(scene, fixture.state, j.own);
-  if (wanted({"contact"})) j.contact = contact_problems(scene, fixture.state, j.own.fields.acceleration);
+  if (wanted({"fields"})) prepared.own_fp32 = fp32_reference_fields(scene, prepared.walls, volumes, fixture.state);
+  if (wanted({"substep"})) prepared.substep = substep_solution(scene, fixture.state, prepared.own);
+  if (wanted({"contact"})) prepared.contact = contact_problems(scene, fixture.state, prepared.own.fields.acceleration);
   const bool runs = wanted({"trajectory", "mass", "containment", "determinism"});
-  if (runs || wanted({"advanced"})) j.segments = stretches_of(fixture, sample_every);
-  if (runs) run_ahead(fixture, j);
+  if (runs || wanted({"advanced"})) prepared.segments = segments_of(fixture, sample_every);
+  if (runs) run_ahead(fixture, prepared);
   // Nobody looks beyond the last view.
-  while (!runs && !j.segments.empty() && !j.segments.back().viewed) j.segments.pop_back();
+  while (!runs && !prepared.segments.empty() && !prepared.segments.back().viewed) prepared.segments.pop_back();
   if (!wanted({"advanced"}))
-    for (Segment& segment : j.segments) segment.viewed = false;
+    for (Segment& segment : prepared.segments) segment.viewed = false;
   if (wanted({"invariance"}))
     for (TransformedProblem& problem : transformed_problems(scene, fixture.state)) {
       Walls walls = sample_walls(problem.scene);
-      ReferenceSolution its_answer = reference_solution(problem.scene, walls, problem.state);
-      j.transformed.push_back({std::move(problem), std::move(walls), std::move(its_answer)});
+      ReferenceSolution its_solution = reference_solution(problem.scene, walls, problem.state);
+      prepared.transformed.push_back({std::move(problem), std::move(walls), std::move(its_solution)});
     }
-  return j;
+  return prepared;
 }
 
 std::vector<CheckRow> run_checks(Backend& backend, const Fixture& fixture, const PreparedReference& oracle,

@@ -127,10 +127,10 @@ void check_evaluation(const Fields& got, const Answered& answered, const Prepare
   check_accelerations("evaluation", got, answered, oracle.own, oracle.own_fp32, builder);
 }
 
-void check_substep(const ParticleState& answer_of_backend, const Answered& answered, const Fixture& fixture,
+void check_substep(const ParticleState& state_of_backend, const Answered& answered, const Fixture& fixture,
                    const PreparedReference& oracle, RowBuilder& builder) {
   const SubstepSolution& solution = oracle.substep;
-  const ParticleState got = nearest_images(answer_of_backend, fixture.scene, solution.outcomes);
+  const ParticleState got = nearest_images(state_of_backend, fixture.scene, solution.outcomes);
   const NearestOutcomes nearest = nearest_outcomes(solution.outcomes, got);
   // An undecidable push is no longer than a particle spacing, or than what pushes back from deep inside
   // a wall: one projection the one way, and two as long the other way; and no faster than sound.

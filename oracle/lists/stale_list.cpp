@@ -65,7 +65,7 @@ FieldDeficit deficit(const Matrix& whole, const Matrix& partial, const Matrix& t
 
 }  // namespace
 
-Instant look_at(const Scene& scene, const Walls& walls, const WallSolution& volumes, const ParticleState& state) {
+Instant instant_of(const Scene& scene, const Walls& walls, const WallSolution& volumes, const ParticleState& state) {
   Instant now;
   now.state = state;
   now.walls = pose_walls(scene, walls, scene.time_at(state.substep));

@@ -57,7 +57,7 @@ struct Instant {
 };
 
 /// The oracle's view of a state. \param volumes  of the wall particles
-Instant look_at(const Scene& scene, const Walls& walls, const WallSolution& volumes, const ParticleState& state);
+Instant instant_of(const Scene& scene, const Walls& walls, const WallSolution& volumes, const ParticleState& state);
 
 /// The list of pairs closer than (1 + skin) H at its build.
 class StaleList {

@@ -29,14 +29,14 @@ CheckSelection checks_of(const ResultsRequest& request) {
   return checks;
 }
 
-CheckedResults check_on_fixture(const ResultsRequest& request, const std::string& name, Report& report) {
+CheckedResults check_on_fixture(const ResultsRequest& request, const std::string& name, ResultsOutcome& outcome) {
   if (request.fixtures.size() != 1)
     throw InputError("command line", "FIXTURE", fmt::format("{} of them", request.fixtures.size()),
                      "the one that --results was computed from (or --oracle)");
   const CheckSelection checks = checks_of(request);
-  const Fixture fixture = read_fixture(request.fixtures.front());
+  const Fixture& fixture = outcome.fixtures.emplace_back(read_fixture(request.fixtures.front()));
   const Results results = read_results(request.results, fixture);
-  report.provenance["fixture_sha256." + fixture.name] = fixture.sha256;
+  outcome.report.provenance["fixture_sha256." + fixture.name] = fixture.sha256;
   const auto oracle = std::make_unique<const PreparedReference>(prepare_reference(fixture, checks));
   return run_checks(results, name, fixture, *oracle, checks);
 }
@@ -70,7 +70,7 @@ ResultsOutcome check_results_file(const ResultsRequest& request) {
   const std::string name = request.name.empty() ? file.stem().string() : request.name;
   ResultsOutcome outcome;
   outcome.report.provenance = build_provenance();
-  CheckedResults judged = request.oracle.empty() ? check_on_fixture(request, name, outcome.report)
+  CheckedResults judged = request.oracle.empty() ? check_on_fixture(request, name, outcome)
                                                  : check_on_oracle(request, name, outcome.report);
   outcome.report.provenance["results_sha256"] = sha256_of_file(file);
 

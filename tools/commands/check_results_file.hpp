@@ -4,6 +4,7 @@
 
 #include "oracle/checks/checks.hpp"
 #include "oracle/report/report.hpp"
+#include "oracle/solution/fixture.hpp"
 
 #include <string>
 #include <vector>
@@ -23,8 +24,9 @@ struct ResultsOutcome {
   /// 0 all that was given passes, 1 something fails, 3 something given has nothing to be judged by,
   /// or nothing was given. What was not given changes nothing here.
   int status = 0;
-  std::string table;  // as console_table, of what was given; then what was not
-  std::string line;   // the table's last
+  std::string table;              // as console_table, of what was given; then what was not
+  std::string line;               // the table's last
+  std::vector<Fixture> fixtures;  // that rows are of; none with an oracle of their own
 };
 
 /// Throws InputError.

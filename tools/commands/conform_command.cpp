@@ -37,7 +37,7 @@ namespace {
 struct ConformArguments {
   BackendFlags flags;
   std::vector<std::string> fixtures, backends, checks;
-  std::string executor = "auto", report, junit, neighborhood, explain;
+  std::string executor = "auto", report, junit, reproducers, explain;
   std::string results, oracle, name, select;
   int sample_every = 0, durations = 0;
   bool all = false, list = false, json = false, quiet = false, exit_first = false;
@@ -284,6 +284,10 @@ int explain(const std::string& name) {
   return exit_pass;
 }
 
+std::vector<ReproducerFile> wanted_reproducers(const ConformArguments& arguments, const Report& report) {
+  return arguments.reproducers.empty() ? std::vector<ReproducerFile>() : reproducers_of(report, arguments.reproducers);
+}
+
 void write_reproducers(const std::vector<ReproducerFile>& reproducers, const Report& report,
                        const std::vector<Fixture>& fixtures, bool talks) {
   for (const ReproducerFile& reproducer : reproducers) {
@@ -320,21 +324,19 @@ int conform_results(const ConformArguments& arguments) {
       arguments.exit_first || arguments.durations > 0)
     throw InputError("command line", "--results", arguments.results,
                      "instead of --backend, --executor, --all, --select, --exitfirst and --durations: nothing is run");
-  if (!arguments.neighborhood.empty() && !arguments.oracle.empty())
-    throw InputError("command line", "--reproducers", arguments.neighborhood,
+  if (!arguments.reproducers.empty() && !arguments.oracle.empty())
+    throw InputError("command line", "--reproducers", arguments.reproducers,
                      "not with --oracle: a reproducer is cut out of a recording");
   arguments.flags.require_used();
   check_output_place("--report", arguments.report);
-  check_output_folder("--reproducers", arguments.neighborhood);
+  check_output_folder("--reproducers", arguments.reproducers);
   std::vector<std::string> files;
   for (const auto& given : arguments.fixtures) files.push_back(recording_called(given).string());
   const ResultsOutcome outcome =
       check_results_file({arguments.results, files, arguments.oracle, arguments.name, arguments.checks});
-  std::vector<ReproducerFile> reproducers;
-  if (!arguments.neighborhood.empty()) reproducers = reproducers_of(outcome.report, arguments.neighborhood);
+  const auto reproducers = wanted_reproducers(arguments, outcome.report);
   hand_over(arguments, outcome.report, reproducers, outcome.status, outcome.table, outcome.line);
-  if (!reproducers.empty())
-    write_reproducers(reproducers, outcome.report, {read_fixture(files.front())}, !arguments.quiet && !arguments.json);
+  write_reproducers(reproducers, outcome.report, outcome.fixtures, !arguments.quiet && !arguments.json);
   return outcome.status;
 }
 
@@ -346,7 +348,7 @@ int conform(ConformArguments& arguments) {
   const CheckSelection checks = arguments.checks.empty() ? all_checks() : parse_checks(arguments.checks);
   check_output_place("--report", arguments.report);
   check_output_place("--junit", arguments.junit);
-  check_output_folder("--reproducers", arguments.neighborhood);
+  check_output_folder("--reproducers", arguments.reproducers);
   auto candidates = candidates_of(arguments);
   const auto fixtures = fixtures_of(arguments);
   const bool talks = !arguments.quiet && !arguments.json;
@@ -374,8 +376,7 @@ int conform(ConformArguments& arguments) {
   check_all(candidates, fixtures, checks, arguments, !talks, work, report, judged, seconds);
   add_what_was_not_judged(candidates, fixtures, judged, "after the first failure (--exitfirst)", report);
   const int status = status_of(report, candidates);
-  std::vector<ReproducerFile> reproducers;
-  if (!arguments.neighborhood.empty()) reproducers = reproducers_of(report, arguments.neighborhood);
+  const auto reproducers = wanted_reproducers(arguments, report);
   hand_over_all(status, reproducers, "");
   if (talks) fmt::print("{}", slowest(seconds, arguments.durations));
   write_reproducers(reproducers, report, fixtures, talks);
@@ -416,8 +417,8 @@ void add_conform_command(CLI::App& app, int& exit_status) {
   verb->add_option("--look-every", arguments->sample_every)->check(CLI::Range(1, 1000000))->group("");
   verb->add_option("--report", arguments->report, "write an HDF5 report");
   verb->add_option("--junit", arguments->junit, "write JUnit XML, for CI");
-  verb->add_option("--surroundings", arguments->neighborhood)->group("");
-  verb->add_option("--reproducers", arguments->neighborhood,
+  verb->add_option("--surroundings", arguments->reproducers)->group("");
+  verb->add_option("--reproducers", arguments->reproducers,
                    "folder for fixtures of the fluid around failing particles");
   verb->add_flag("--json", arguments->json, "rows as JSON instead of the table");
   verb->add_flag("--quiet", arguments->quiet, "the verdict's line alone");

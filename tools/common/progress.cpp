@@ -56,7 +56,8 @@ void Progress::update(std::int64_t done, const std::string& note, double part) {
   begun_ = true;
   last_ = now;
   const double elapsed = std::chrono::duration<double>(now - start_).count();
-  const double here = static_cast<double>(done - first_) + part, all = static_cast<double>(total_ - first_);
+  const double at = static_cast<double>(done) + part, total = static_cast<double>(total_);
+  const double here = at - static_cast<double>(first_), all = total - static_cast<double>(first_);
   std::string left;
   if (last) left = "took " + duration_text(elapsed);
   else if (here > 0) left = duration_text(elapsed * (all - here) / here) + " left";
@@ -66,9 +67,7 @@ void Progress::update(std::int64_t done, const std::string& note, double part) {
     fmt::print(stderr, "{}\n", text);
     return;
   }
-  fmt::print(stderr, "\r\x1b[K{}",
-             progress_line(columns(),
-                           static_cast<double>(done) / static_cast<double>(std::max<std::int64_t>(total_, 1)), text));
+  fmt::print(stderr, "\r\x1b[K{}", progress_line(columns(), at / std::max(total, 1.0), text));
   std::fflush(stderr);
   line_open_ = true;
 }

@@ -57,7 +57,7 @@ PourDrift along_pour(const Scene& scene, const DriftPlan& plan, int samples, con
     std::vector<Instant> instants(states.size());
     tbb::parallel_for(std::size_t{0}, states.size(), [&](std::size_t k) {
       const auto at = k;
-      instants[at] = look_at(scene, walls, volumes, states[at]);
+      instants[at] = instant_of(scene, walls, volumes, states[at]);
     });
     std::vector<PourMoment> moments(plan.lists.size());
     tbb::parallel_for(std::size_t{0}, plan.lists.size(), [&](std::size_t k) {

@@ -88,7 +88,7 @@ DriftResult measure_series(const Fixture& fixture, const std::filesystem::path& 
       in.fail(group, "not finite", "finite positions and velocities");
     substeps.push_back(state.substep);
     used.push_back(in.integers(group + "/list", 1)[0]);
-    instants[state.substep] = look_at(scene, walls, volumes, state);
+    instants[state.substep] = instant_of(scene, walls, volumes, state);
   }
   std::map<std::int64_t, StaleList> lists;
   std::vector<DriftSample> samples;

@@ -177,7 +177,7 @@ std::vector<ListChoice> derived_lists(const std::vector<Fixture>& fixtures, cons
     const Walls walls = sample_walls(fixture.scene);
     const WallSolution volumes = wall_solution(fixture.scene, walls);
     const PairsNearEdge near =
-        pairs_near_edge(fixture.scene, volumes.volume, look_at(fixture.scene, walls, volumes, fixture.state));
+        pairs_near_edge(fixture.scene, volumes.volume, instant_of(fixture.scene, walls, volumes, fixture.state));
     for (ListChoice& list : lists) {
       const double age = (list.interval - 1) * fixture.scene.time_step();
       const double skin = skin_for(fixture.scene, near, age, tolerance);
@@ -190,15 +190,6 @@ std::vector<ListChoice> derived_lists(const std::vector<Fixture>& fixtures, cons
 DriftResult measure_drift(const Fixture& fixture, const DriftPlan& plan, const ListMaker& make_list,
                           const std::function<void(double)>& progress) {
   const auto start = Clock::now();
-  std::vector<Build> builds = builds_of(plan);
-  std::mutex mutex;
-  std::size_t done = 0;
-  const std::size_t all = static_cast<std::size_t>(plan.window) + 1 + builds.size();
-  const auto one_done = [&] {
-    const std::lock_guard lock(mutex);
-    ++done;
-    if (progress) progress(std::min(1.0, static_cast<double>(done) / static_cast<double>(all)));
-  };
   const Scene& scene = fixture.scene;
   const Walls walls = sample_walls(scene);
   const WallSolution volumes = wall_solution(scene, walls);
@@ -209,9 +200,18 @@ DriftResult measure_drift(const Fixture& fixture, const DriftPlan& plan, const L
   result.particles = fixture.state.size();
 
   const auto states = run_window(fixture, walls, *make_list(""), plan.window);
+  std::vector<Build> builds = builds_of(plan);
+  std::mutex mutex;
+  const std::size_t all = states.size() + builds.size();
+  std::size_t done = 0;
+  const auto one_done = [&] {
+    const std::lock_guard lock(mutex);
+    ++done;
+    if (progress) progress(static_cast<double>(done) / static_cast<double>(all));
+  };
   std::vector<Instant> window(states.size());
   tbb::parallel_for(std::size_t{0}, states.size(), [&](std::size_t k) {
-    window[k] = look_at(scene, walls, volumes, states[k]);
+    window[k] = instant_of(scene, walls, volumes, states[k]);
     one_done();
   });
   tbb::parallel_for(std::size_t{0}, builds.size(), [&](std::size_t k) {

@@ -42,8 +42,8 @@ class Running {
     std::vector<std::thread> threads;
     for (int t = 0; t < s_.threads; ++t) threads.emplace_back([this] { work(); });
     for (auto& thread : threads) thread.join();
-    if (trouble_) std::rethrow_exception(trouble_);
-    for (auto& [key, counted] : tallies_) all_.statistics.push_back(counted);
+    if (failure_) std::rethrow_exception(failure_);
+    for (auto& [key, counted] : statistics_) all_.statistics.push_back(counted);
     std::sort(all_.counterexamples.begin(), all_.counterexamples.end(),
               [](const Counterexample& a, const Counterexample& b) {
                 return std::tie(a.seed, a.outcome.backend, a.outcome.property) <
@@ -71,15 +71,15 @@ class Running {
         if (over(k)) break;
         const std::uint64_t seed = s_.first_seed + static_cast<std::uint64_t>(k);
         const Case fuzz_case = random_case(seed);
-        const Fixture problem = fixture_of(fuzz_case, fmt::format("fuzz-{}", seed));
-        const std::vector<Outcome> outcomes = tester.test(problem, seed);
-        take(tags_of(problem), outcomes, seed);
+        const Fixture fixture = fixture_of(fuzz_case, fmt::format("fuzz-{}", seed));
+        const std::vector<Outcome> outcomes = tester.test(fixture, seed);
+        take(tags_of(fixture), outcomes, seed);
         for (const Outcome& outcome : outcomes)
           if (!outcome.holds) find(tester, seed, fuzz_case, outcome);
       }
     } catch (...) {
       const std::lock_guard lock(mutex_);
-      trouble_ = std::current_exception();
+      failure_ = std::current_exception();
       ended_ = true;
     }
   }
@@ -90,7 +90,7 @@ class Running {
     for (std::size_t c = 0; c < tags.size(); ++c) all_.tags[c] += tags[c];
     if (outcomes.empty()) ++all_.undecidable;
     for (const Outcome& o : outcomes) {
-      PropertyStatistics& counted = tallies_[{o.property, o.backend}];
+      PropertyStatistics& counted = statistics_[{o.property, o.backend}];
       counted.backend = o.backend;
       counted.property = o.property;
       ++counted.asked;
@@ -105,7 +105,7 @@ class Running {
     told_ = Clock::now();
     all_.seconds = seconds();
     Campaign now = all_;
-    for (auto& [key, counted] : tallies_) now.statistics.push_back(counted);
+    for (auto& [key, counted] : statistics_) now.statistics.push_back(counted);
     s_.progress(now);
   }
 
@@ -113,7 +113,7 @@ class Running {
   void find(Tester& tester, std::uint64_t seed, const Case& fuzz_case, const Outcome& outcome) {
     {
       const std::lock_guard lock(mutex_);
-      if (!shrunk_.insert(outcome.backend + " " + outcome.property).second) return;
+      if (!minimised_.insert(outcome.backend + " " + outcome.property).second) return;
     }
     Counterexample found;
     found.seed = seed;
@@ -121,7 +121,7 @@ class Running {
     found.outcome = outcome;
     found = minimise(tester, std::move(found), s_.minimise_tries);
     const std::lock_guard lock(mutex_);
-    if (!s_.failures.empty()) found.file = write_finding(s_.failures, found);
+    if (!s_.failures.empty()) found.file = write_counterexample(s_.failures, found);
     all_.counterexamples.push_back(std::move(found));
     if (static_cast<int>(all_.counterexamples.size()) >= s_.most_counterexamples) ended_ = true;
   }
@@ -132,10 +132,10 @@ class Running {
   std::atomic<std::int64_t> next_{0};
   std::atomic<bool> ended_{false};
   std::mutex mutex_;
-  std::map<std::pair<std::string, std::string>, PropertyStatistics> tallies_;  // by property and backend
-  std::set<std::string> shrunk_;
+  std::map<std::pair<std::string, std::string>, PropertyStatistics> statistics_;  // by property and backend
+  std::set<std::string> minimised_;
   Campaign all_;
-  std::exception_ptr trouble_;
+  std::exception_ptr failure_;
 };
 
 }  // namespace
@@ -155,7 +155,7 @@ std::string write_case(const std::filesystem::path& folder, const Case& fuzz_cas
   return file.string();
 }
 
-std::string write_finding(const std::filesystem::path& folder, const Counterexample& counterexample) {
+std::string write_counterexample(const std::filesystem::path& folder, const Counterexample& counterexample) {
   std::string backend = counterexample.outcome.backend;
   for (char& c : backend)
     if (c == ':' || c == '=') c = '-';

@@ -50,12 +50,12 @@ class Tester {
 
   /// Holds one case to all properties whose turn it is. Empty `outcomes`: fp32 cannot tell this
   /// case's neighbors apart, and no property is asked.
-  std::vector<Outcome> test(const Fixture& problem, std::uint64_t seed);
+  std::vector<Outcome> test(const Fixture& drawn, std::uint64_t seed);
   /// One property of one backend, whosever turn it is.
   Outcome test_one(const Case& fuzz_case, std::uint64_t seed, const Outcome& like);
 
  private:
-  std::vector<Outcome> outcomes(const Fixture& problem, std::uint64_t seed, const std::set<std::string>& backends,
+  std::vector<Outcome> outcomes(const Fixture& drawn, std::uint64_t seed, const std::set<std::string>& backends,
                                 const std::set<std::string>& wanted);
   Backend& backend(const std::string& choice);
 
@@ -123,7 +123,7 @@ Campaign run_campaign(const Settings& settings, const BackendMaker& make);
 /// fixture's file.
 std::string write_case(const std::filesystem::path& folder, const Case& fuzz_case, const std::string& name,
                        const std::map<std::string, std::string>& provenance);
-std::string write_finding(const std::filesystem::path& folder, const Counterexample& counterexample);
+std::string write_counterexample(const std::filesystem::path& folder, const Counterexample& counterexample);
 
 /// Table for people.
 std::string campaign_table(const Campaign& campaign);

@@ -1,5 +1,5 @@
 /// \file
-/// Shrinking: a failure is made as small as it stays one. First particles leave, by halves, quarters and
+/// Minimising: a failure is made as small as it stays one. First particles leave, by halves, quarters and
 /// so on to one (Zeller & Hildebrandt, IEEE Trans. Softw. Eng. 28 (2002), `ddmin`), then what is around
 /// them is made plain, then every number goes towards 0 by halves; over again as long as that helps.
 #include "reference/scene_checks.hpp"
@@ -11,9 +11,9 @@
 namespace decant::fuzz {
 namespace {
 
-class Shrinking {
+class Minimising {
  public:
-  Shrinking(Tester& tester, Counterexample found, int most_tries, double seconds)
+  Minimising(Tester& tester, Counterexample found, int most_tries, double seconds)
       : tester_(tester),
         best_(std::move(found)),
         most_(most_tries),
@@ -154,7 +154,7 @@ class Shrinking {
 }  // namespace
 
 Counterexample minimise(Tester& tester, Counterexample found, int most_tries, double seconds) {
-  return Shrinking(tester, std::move(found), most_tries, seconds).run();
+  return Minimising(tester, std::move(found), most_tries, seconds).run();
 }
 
 }  // namespace decant::fuzz

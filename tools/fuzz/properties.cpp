@@ -224,12 +224,12 @@ Backend& Tester::backend(const std::string& choice) {
   return *made_.emplace_back(choice, make_(choice)).second;
 }
 
-std::vector<Outcome> Tester::test(const Fixture& problem, std::uint64_t seed) {
+std::vector<Outcome> Tester::test(const Fixture& drawn, std::uint64_t seed) {
   std::set<std::string> wanted;
   for (const Property& property : properties())
     if (properties_.contains(property.name) && (every_case_ || seed % static_cast<std::uint64_t>(property.every) == 0))
       wanted.insert(property.name);
-  return outcomes(problem, seed, {names_.begin(), names_.end()}, wanted);
+  return outcomes(drawn, seed, {names_.begin(), names_.end()}, wanted);
 }
 
 Outcome Tester::test_one(const Case& fuzz_case, std::uint64_t seed, const Outcome& like) {
@@ -239,7 +239,7 @@ Outcome Tester::test_one(const Case& fuzz_case, std::uint64_t seed, const Outcom
   return {like.backend, like.property, true, 0, "", ""};
 }
 
-std::vector<Outcome> Tester::outcomes(const Fixture& problem, std::uint64_t seed, const std::set<std::string>& backends,
+std::vector<Outcome> Tester::outcomes(const Fixture& drawn, std::uint64_t seed, const std::set<std::string>& backends,
                                       const std::set<std::string>& asked) {
   std::vector<Outcome> all;
   std::set<std::string> wanted = asked;
@@ -252,10 +252,10 @@ std::vector<Outcome> Tester::outcomes(const Fixture& problem, std::uint64_t seed
     }
   };
   // Of the scene, whatever becomes of the state.
-  ask("scene", "round-trip", [&] { return round_trip(problem.scene); });
-  ask("scene", "refusal", [&] { return refusal(problem.scene, seed); });
+  ask("scene", "round-trip", [&] { return round_trip(drawn.scene); });
+  ask("scene", "refusal", [&] { return refusal(drawn.scene, seed); });
 
-  Fixture fixture = problem;
+  Fixture fixture = drawn;
   fixture.ensemble.substeps = run_substeps;
   const auto chosen_checks = [&] {
     CheckSelection checks;

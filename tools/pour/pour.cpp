@@ -69,7 +69,7 @@ class Pour {
         backend_(backend),
         options_(options),
         files_(options.out),
-        stretches_(scene),
+        segments_(scene),
         limits_(limits_of(scene)),
         audit_(scene) {
     if (options.stop && options.leave) watcher_.emplace(options.stop, [this] { leave(); });
@@ -83,7 +83,7 @@ class Pour {
   void resume();
   void open_frames(bool anew);
   void sample(const Fields& fields);
-  bool next_stretch();
+  bool next_segment();
   void tell_limits();
   void checkpoint();
   void finish();
@@ -92,7 +92,7 @@ class Pour {
   void check(const Status& status, const ParticleState& good);
   [[noreturn]] void dump(const std::string& trouble, const ParticleState& good);
   double wall_seconds() const { return wall_before_ + seconds_since(started_); }
-  std::int64_t done_in_frame() const { return state_.substep - frame_ * stretches_.substeps(); }
+  std::int64_t done_in_frame() const { return state_.substep - frame_ * segments_.substeps(); }
 
   /// A call of the backend's, which a stop does not wait for.
   template <class Call>
@@ -104,7 +104,7 @@ class Pour {
   Backend& backend_;
   const PourOptions& options_;
   const PourFiles files_;
-  const Segments stretches_;
+  const Segments segments_;
   const SceneLimits limits_;
   std::optional<FolderLock> lock_;
   Audit audit_;
@@ -137,7 +137,7 @@ PourResult Pour::run() {
   progress_->update(frame_);
   tell_limits();
   while (frame_ < scene_.schedule.frames && !(options_.stop && options_.stop())) {
-    if (next_stretch()) {
+    if (next_segment()) {
       const TimelineRow& row = timeline_.rows.back();
       progress_->update(frame_, fmt::format("t = {:.3f} s, v <= {:.2f} m/s{}", row.time, row.max_speed,
                                             told_.empty() ? "" : ", BEYOND LIMITS"));
@@ -211,7 +211,7 @@ void Pour::resume() {
   state_ = std::move(from.state);
   frame_ = from.frame;
   if (const std::int64_t done = done_in_frame();
-      done < 0 || (done > 0) != from.part.has_value() || done >= stretches_.substeps() || !stretches_.meet_at(done))
+      done < 0 || (done > 0) != from.part.has_value() || done >= segments_.substeps() || !segments_.meet_at(done))
     throw InputError(files_.checkpoint.string(), "substep", std::to_string(state_.substep),
                      fmt::format("where a segment of frame {} ends", frame_ + 1));
   timeline_ = std::move(from.timeline);
@@ -224,12 +224,12 @@ void Pour::resume() {
   call([&] { backend_.load(scene_, walls_, state_); });
   // Paths to the next look start at the last one.
   if (from.part) part_ = std::move(*from.part);
-  ParticleState looked_at = state_;
+  ParticleState sampled = state_;
   if (from.part) {
-    looked_at.substep = part_.looked_at_substep;
-    looked_at.position = part_.looked_at;
+    sampled.substep = part_.looked_at_substep;
+    sampled.position = part_.looked_at;
   }
-  (void)audit_.sample(looked_at);
+  (void)audit_.sample(sampled);
   open_frames(false);
   begun_ = true;
   if (!options_.quiet)
@@ -281,13 +281,13 @@ void Pour::sample(const Fields& fields) {
 }
 
 /// Whether it ended a frame.
-bool Pour::next_stretch() {
-  const std::int64_t done = done_in_frame(), end = stretches_.end_of(done), expected = state_.substep + end - done;
+bool Pour::next_segment() {
+  const std::int64_t done = done_in_frame(), end = segments_.end_of(done), expected = state_.substep + end - done;
   if (done == 0) {
     part_.looked_at = state_.position;
     part_.looked_at_substep = state_.substep;
   }
-  const bool whole = end == stretches_.substeps();
+  const bool whole = end == segments_.substeps();
   double seconds = 0;
   ParticleState next;
   Fields fields;
@@ -316,7 +316,7 @@ bool Pour::next_stretch() {
     sample(fields);
     return true;
   }
-  if (stretches_.samples_at(end)) {
+  if (segments_.samples_at(end)) {
     const AuditResult seen = audit_.sample(state_);
     if (seen.max_speed > part_.on_the_way.max_speed) part_.fastest_particle = fastest_in(state_);
     keep_worst(part_.on_the_way, seen);

@@ -12,7 +12,7 @@ namespace {
 
 /// How often walls are looked at between two frames. Paths are followed as straight lines: what moves
 /// further than two walls are thick, at the speed to expect, may turn on its way.
-std::int64_t looks_per_frame(const Scene& scene) {
+std::int64_t samples_per_frame(const Scene& scene) {
   double thinnest = INFINITY;
   for (const Container& container : scene.containers) thinnest = std::min(thinnest, container.wall_thickness);
   const double way =
@@ -23,7 +23,7 @@ std::int64_t looks_per_frame(const Scene& scene) {
 
 }  // namespace
 
-Segments::Segments(const Scene& scene) : all_(scene.schedule.substeps_per_frame), samples_(looks_per_frame(scene)) {}
+Segments::Segments(const Scene& scene) : all_(scene.schedule.substeps_per_frame), samples_(samples_per_frame(scene)) {}
 
 std::int64_t Segments::sample_of(std::int64_t done) const {
   std::int64_t k = done * samples_ / all_;

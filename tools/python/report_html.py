@@ -12,11 +12,10 @@ import argparse
 import pathlib
 import sys
 
-import h5py
 from markupsafe import Markup
 
 from check_explanations import check_of, explanations
-from one_line import run_main
+from one_line import open_hdf5, run_main
 from pages import anchors, number, render, write_aside
 from report_plots import QUANTILES, distribution_plot, slice_plot, three_way_plot
 
@@ -41,10 +40,8 @@ def renamed(row):
 
 
 def read(path):
-    """Rows as dicts, provenance, and the surroundings' arrays and attributes, or None."""
-    with h5py.File(path, "r") as file:
-        if "decant_report" not in file.attrs:
-            raise OSError("no report")
+    """Rows as dicts, provenance, and the neighborhood's arrays and attributes, or None."""
+    with open_hdf5(path, ["decant_report"], "a report of decant conform") as file:
         schema = file.attrs["decant_report"]
         if schema not in (2, 3):
             raise OSError(f"schema {schema}, this script reads 2 and 3")

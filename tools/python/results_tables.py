@@ -14,6 +14,7 @@ from pathlib import Path
 
 import h5py
 
+from merge_fuzz import GROUPS
 from one_line import read_text, refuse, run_main
 from option_names import current
 
@@ -225,15 +226,15 @@ def campaigns():
         path = RESULTS / folder / "fuzz.h5"
         with h5py.File(path) as file:
             a = file.attrs
-            old = int(a["decant_fuzz"]) == 1
-            t = file["tallies" if old else "statistics"]
+            _, statistics, counterexamples = GROUPS[int(a["decant_fuzz"])]
+            t = file[statistics]
             backends = sorted({renamed(text(b)) for b in t["backend"][:]} - {"scene"})
             shown.append(
                 [
                     device_of(text(a["device"])),
                     ", ".join(backends),
                     f"{int(a['cases']):,}",
-                    len(file["findings/seed" if old else "counterexamples/seed"]),
+                    len(file[f"{counterexamples}/seed"]),
                     f"{a['cases'] / a['seconds']:.0f}",
                     text(file["provenance"].attrs["git_revision"]),
                 ]

@@ -7,13 +7,12 @@ import argparse
 import base64
 from pathlib import Path
 
-import h5py
 import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from one_line import run_main  # noqa: E402
+from one_line import open_hdf5, run_main  # noqa: E402
 from pages import anchors, render, write_aside  # noqa: E402
 
 COLORS = ["#4c78a8", "#e45756", "#54a24b", "#b279a2", "#f58518", "#72b7b2", "#9d755d"]
@@ -50,9 +49,7 @@ class Report:
             run["replaced"] = run.get("replaced", False) or run["case"] in cases
 
     def read(self, path):
-        with h5py.File(path) as file:
-            if "decant_validation" not in file.attrs:
-                raise OSError(f"{path}: not a report of decant validate")
+        with open_hdf5(path, ["decant_validation"], "a report of decant validate") as file:
             self.provenance = {k: v.decode() if isinstance(v, bytes) else v
                                for k, v in file["provenance"].attrs.items()}
             self.runs = self.rows(file["runs"])
