@@ -93,6 +93,7 @@ struct BruteQuery {
 #pragma unroll
         for (int k = 0; k < Team::held; ++k) least[k] = periodic ? bound[k] - 1.0f : 3.0e38f;
         if constexpr (!periodic) {
+#ifdef __CUDACC__
 #pragma unroll
           for (int s = 0; s < batch; ++s) {
             const float4 p = tile[at + s * tile_lanes];
@@ -101,6 +102,16 @@ struct BruteQuery {
               least[k] = lesser(back[k].x * p.x + (back[k].y * p.y + (back[k].z * p.z + p.w)),
                                 least[k]);
           }
+#else
+          // A smallest float is found one by one, whether any is small by vectors.
+          int near = 0;
+#pragma omp simd reduction(| : near)
+          for (int s = 0; s < batch; ++s) {
+            const float4 p = tile[at + s];
+            near |= back[0].x * p.x + (back[0].y * p.y + (back[0].z * p.z + p.w)) < bound[0];
+          }
+          if (near != 0) least[0] = -3.0e38f;
+#endif
         }
         bool any = false;
 #pragma unroll
