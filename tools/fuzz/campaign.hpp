@@ -78,7 +78,7 @@ struct Counterexample {
 
 /// Fewer particles, then smaller numbers, as long as the same property of the same backend fails.
 /// Ends after so many tries or seconds.
-Counterexample minimise(Tester& tester, Counterexample found, int most_tries, double seconds = 20);
+Counterexample minimise(Tester& tester, Counterexample found, int most_tries, double seconds);
 
 /// Scores of a property of a backend over all cases.
 struct PropertyStatistics {
@@ -100,6 +100,7 @@ struct Settings {
   int threads = 1;
   int most_counterexamples = 16;  // a campaign stops here
   int minimise_tries = 2000;
+  double minimise_seconds = 20;  // of each counterexample
   std::filesystem::path failures;  // folder for fixtures of counterexamples; empty: none are written
   std::function<bool()> stop;
   std::function<void(const struct Campaign&)> progress;  // now and then, from one thread at a time
