@@ -2,12 +2,15 @@
 /// Where the audit says water is, and what it calls a way through a wall, against states whose
 /// answer is plain.
 #include "oracle/checks/audit.hpp"
+#include "reference/distance.hpp"
 #include "reference/pose.hpp"
 #include "tests/falling_points.hpp"
 #include "tests/generators.hpp"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace decant::test {
@@ -111,6 +114,60 @@ TEST(Audit, SeesAWallThatSweepsOverARestingParticle) {
   Audit audit(scene);
   ASSERT_EQ(audit.sample(at_rest(x, 0)).inside, 0);
   EXPECT_EQ(audit.sample(at_rest(x, 60)).crossed, 1);
+}
+
+/// More particles than one task takes, most of them near walls: each is found as if it were alone.
+TEST(Audit, SaysOfEachOfManyParticlesWhatItSaysOfThatAlone) {
+  const Scene scene = two_cups();
+  const int n = 3000;
+  const Eigen::Matrix3Xd from = cloud(1, n, -0.5, 0.5), to = from + cloud(2, n, -0.1, 0.1);
+  Audit together(scene);
+  (void)together.sample(at_rest(from, 0));
+  const AuditResult all = together.sample(at_rest(to, 20));
+  std::int64_t inside = 0, crossed = 0, first_crossed = -1, deepest_particle = -1;
+  double deepest = 0;
+  for (int i = 0; i < n; ++i) {
+    Audit alone(scene);
+    (void)alone.sample(at_rest(from.col(i), 0));
+    const AuditResult one = alone.sample(at_rest(to.col(i), 20));
+    ASSERT_EQ(one.region[0], all.region[static_cast<std::size_t>(i)]) << i;
+    inside += one.inside;
+    crossed += one.crossed;
+    if (one.crossed > 0 && first_crossed < 0) first_crossed = i;
+    if (one.deepest > deepest) deepest_particle = i;
+    deepest = std::max(deepest, one.deepest);
+  }
+  EXPECT_GT(crossed, 20);
+  EXPECT_GT(inside, 20);
+  EXPECT_EQ(all.inside, inside);
+  EXPECT_EQ(all.crossed, crossed);
+  EXPECT_EQ(all.first_crossed, first_crossed);
+  EXPECT_EQ(all.deepest, deepest);
+  EXPECT_EQ(all.deepest_particle, deepest_particle);
+}
+
+/// Against the distance at a thousand points of each path, in the frame of a cup that moves meanwhile.
+TEST(Audit, FindsTheCrossingsThatFollowingEachPathFinds) {
+  const Scene scene = two_cups();
+  const int n = 2000, points = 1000;
+  const std::int64_t last = 20;
+  const Eigen::Matrix3Xd from = cloud(3, n, -0.4, 0.4), to = from + cloud(4, n, -0.2, 0.2);
+  int crossings = 0;
+  for (int i = 0; i < n; ++i) {
+    double margin = -INFINITY;  // m, deepest below a quarter of a wall, of the wall that is passed deepest
+    for (const Container& c : scene.containers) {
+      const Vec3 a = pose_at(c, 0.0).to_local(from.col(i)), b = pose_at(c, scene.time_at(last)).to_local(to.col(i));
+      for (int k = 0; k <= points; ++k)
+        margin = std::max(margin, -signed_distance(c, a + (b - a) * k / points).distance - 0.25 * c.wall_thickness);
+    }
+    // What lies between two points decides.
+    if (std::abs(margin) < 2e-4) continue;
+    Audit audit(scene);
+    (void)audit.sample(at_rest(from.col(i), 0));
+    EXPECT_EQ(audit.sample(at_rest(to.col(i), last)).crossed, margin > 0) << i;
+    crossings += margin > 0;
+  }
+  EXPECT_GT(crossings, 50);
 }
 
 TEST(Audit, AddsUpEnergies) {

@@ -11,10 +11,36 @@
 #include "reference/neighbors.hpp"
 #include "reference/pose.hpp"
 
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
 #include <cmath>
 
 namespace decant {
 namespace {
+
+// Particles that one task looks at. Sums are taken by chunk, so that they do not depend on the number of threads.
+constexpr Eigen::Index particles_per_chunk = 1024;
+
+/// What is found in one chunk.
+struct Chunk {
+  double kinetic_energy = 0, potential_energy = 0;  // J
+  double max_speed_squared = 0;                     // m²/s²
+  struct Deepest {
+    double depth = 0;  // m
+    std::int64_t particle = -1;
+  };
+  std::vector<Deepest> deepest;  // by container
+};
+
+/// A container where it stands, and where it stood at the sample before.
+struct Placed {
+  const SolidDistance& solid;
+  Pose pose, before;
+  std::uint8_t cavity;  // Region
+  bool revolved;
+  double crossing_depth;  // m, of a path in the solid
+};
 
 /// Whether the segment a–b enters the solid deeper than `depth`. The distance changes by at most the
 /// way walked, so most segments are settled by their ends.
@@ -26,6 +52,9 @@ bool runs_deeper(const SolidDistance& solid, const Vec3& a, double at_a, const V
   const double at_middle = solid.at(middle).distance;
   return runs_deeper(solid, a, at_a, middle, at_middle, depth) || runs_deeper(solid, middle, at_middle, b, at_b, depth);
 }
+
+/// NaN once seen stays.
+double larger_or_nan(double a, double b) { return std::isnan(a) || b <= a ? a : b; }
 
 bool outside(const Domain& domain, const Vec3& x) {
   for (int a = 0; a < 3; ++a)
@@ -42,48 +71,73 @@ AuditResult Audit::sample(const ParticleState& state) {
   const auto n = state.size();
   const double mass = scene_.particle_mass(), time = scene_.time_at(state.substep);
   const Separation separation(scene_.domain);
+  const bool follows = last_.cols() == n;
   result.region.assign(static_cast<std::size_t>(n), static_cast<std::uint8_t>(Region::in_flight));
 
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const Vec3 x = state.position.col(i), v = state.velocity.col(i);
-    auto& region = result.region[static_cast<std::size_t>(i)];
-    if (scene_.floor && x.z() - scene_.floor->height < scene_.support_radius())
-      region = static_cast<std::uint8_t>(Region::spilled);
-    if (outside(scene_.domain, x) || !v.allFinite()) region = static_cast<std::uint8_t>(Region::lost);
-    result.kinetic_energy += 0.5 * mass * v.squaredNorm();
-    result.potential_energy -= mass * scene_.gravity.dot(x);
-    // NaN once seen stays.
-    if (!(v.norm() <= result.max_speed) && !std::isnan(result.max_speed)) result.max_speed = v.norm();
-  }
-
+  std::vector<Placed> containers;
   bool source_seen = false;
-  std::vector<bool> inside(static_cast<std::size_t>(n)), crossed(static_cast<std::size_t>(n));
   for (std::size_t c = 0; c < solids_.size(); ++c) {
     const Container& container = scene_.containers[c];
     const bool is_source = moves(container) && !source_seen;
     source_seen = source_seen || is_source;
-    const auto cavity = static_cast<std::uint8_t>(is_source ? Region::source : Region::receiver);
-    const Pose pose = pose_at(container, time);
-    const Pose pose_before = pose_at(container, scene_.time_at(last_substep_));
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      if (result.region[k] == static_cast<std::uint8_t>(Region::lost)) continue;
-      const Vec3 x = state.position.col(i), local = pose.to_local(x);
-      if (solids_[c].in_cavity(local)) result.region[k] = cavity;
-      const double distance = solids_[c].at(local).distance;
-      if (distance < 0) inside[k] = true;
-      if (-distance > result.deepest) {
-        result.deepest = -distance;
-        result.deepest_particle = i;
-      }
-      if (last_.cols() != n) continue;
-      const Vec3 x_before = x - separation(x, Vec3(last_.col(i)));
-      const Vec3 before = pose_before.to_local(x_before);
-      if (runs_deeper(solids_[c], before, solids_[c].at(before).distance, local, distance,
-                      0.25 * container.wall_thickness))
-        crossed[k] = true;
-    }
+    containers.push_back({solids_[c], pose_at(container, time), pose_at(container, scene_.time_at(last_substep_)),
+                          static_cast<std::uint8_t>(is_source ? Region::source : Region::receiver),
+                          std::holds_alternative<RevolvedShape>(container.shape), 0.25 * container.wall_thickness});
   }
+
+  // Not of bool, whose elements share bytes.
+  std::vector<std::uint8_t> inside(static_cast<std::size_t>(n)), crossed(static_cast<std::size_t>(n));
+  const auto sample_particle = [&](Eigen::Index i, Chunk& chunk) {
+    const Vec3 x = state.position.col(i), v = state.velocity.col(i);
+    const auto k = static_cast<std::size_t>(i);
+    auto& region = result.region[k];
+    if (scene_.floor && x.z() - scene_.floor->height < scene_.support_radius())
+      region = static_cast<std::uint8_t>(Region::spilled);
+    if (outside(scene_.domain, x) || !v.allFinite()) region = static_cast<std::uint8_t>(Region::lost);
+    const double squared = v.squaredNorm();
+    chunk.kinetic_energy += 0.5 * mass * squared;
+    chunk.potential_energy -= mass * scene_.gravity.dot(x);
+    chunk.max_speed_squared = larger_or_nan(chunk.max_speed_squared, squared);
+    if (region == static_cast<std::uint8_t>(Region::lost)) return;
+    const Vec3 x_before = follows ? Vec3(x - separation(x, Vec3(last_.col(i)))) : x;
+    for (std::size_t c = 0; c < containers.size(); ++c) {
+      const Placed& at = containers[c];
+      const Vec3 local = at.pose.to_local(x);
+      const Vec3 before = follows ? at.before.to_local(x_before) : local;
+      const double length = (local - before).norm();
+      const bool near = at.solid.may_be_within(0, local);
+      if ((near || !at.revolved) && at.solid.in_cavity(local)) region = at.cavity;
+      if (!near && !at.solid.may_be_within(length, local)) continue;
+      const double distance = at.solid.at(local).distance;
+      if (distance < 0) inside[k] = 1;
+      if (-distance > chunk.deepest[c].depth) chunk.deepest[c] = {-distance, i};
+      // Along the path the distance differs from this one by no more than the path's length.
+      if (!(distance - length < -at.crossing_depth) || !follows) continue;
+      if (runs_deeper(at.solid, before, at.solid.at(before).distance, local, distance, at.crossing_depth))
+        crossed[k] = 1;
+    }
+  };
+
+  std::vector<Chunk> chunks(static_cast<std::size_t>((n + particles_per_chunk - 1) / particles_per_chunk));
+  tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) {
+    chunks[c].deepest.resize(containers.size());
+    const Eigen::Index first = static_cast<Eigen::Index>(c) * particles_per_chunk;
+    for (Eigen::Index i = first; i < std::min(n, first + particles_per_chunk); ++i) sample_particle(i, chunks[c]);
+  });
+
+  double squared = 0;
+  for (const Chunk& chunk : chunks) {
+    result.kinetic_energy += chunk.kinetic_energy;
+    result.potential_energy += chunk.potential_energy;
+    squared = larger_or_nan(squared, chunk.max_speed_squared);
+  }
+  result.max_speed = std::sqrt(squared);
+  for (std::size_t c = 0; c < containers.size(); ++c)
+    for (const Chunk& chunk : chunks)
+      if (chunk.deepest[c].depth > result.deepest) {
+        result.deepest = chunk.deepest[c].depth;
+        result.deepest_particle = chunk.deepest[c].particle;
+      }
   for (std::size_t k = 0; k < result.region.size(); ++k) {
     ++result.particles_at[result.region[k]];
     result.inside += inside[k];
