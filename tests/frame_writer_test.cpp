@@ -1,20 +1,27 @@
 /// \file
 /// What a frame looks like on the disk: HDF5, CSV, XDMF, and the thread that puts it there.
-#include "tools/frames/frame_writer.hpp"
+#include "tools/frames/frame_file.hpp"
 
+#include "oracle/checks/audit.hpp"
 #include "oracle/files/hdf5_io.hpp"
 #include "reference/error.hpp"
 #include "tests/falling_points.hpp"
 #include "tests/temporary_folder.hpp"
+#include "tools/common/work_thread.hpp"
+#include "tools/frames/csv_writer.hpp"
+#include "tools/frames/make_frame.hpp"
 #include "tools/frames/xdmf.hpp"
 
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <fstream>
 #include <regex>
 #include <sstream>
+#include <thread>
+#include <utility>
 
 namespace decant {
 namespace {
@@ -36,9 +43,9 @@ Frame awkward_frame(const Scene& scene, const FrameLayout& layout, std::int64_t 
   Fields fields = Fields::unwritten(particles, 0);
   fields.density.setConstant(1000.0 / 3.0);
   fields.pressure.setLinSpaced(particles, -1.0, 1.0);
-  AuditResult audit;
-  audit.region.assign(particles, static_cast<std::uint8_t>(Region::receiver));
-  return make_frame(scene, layout, index, state, fields, audit);
+  Frame frame = make_frame(scene, layout, index, state, fields);
+  frame.place.assign(particles, static_cast<std::uint8_t>(Region::receiver));
+  return frame;
 }
 
 std::string text_of(const std::filesystem::path& file) {
@@ -104,6 +111,23 @@ TEST(FrameFile, TellsWrittenFramesFromUnwrittenOnesByTheirTime) {
   EXPECT_TRUE(std::isnan(time[0]));
   EXPECT_EQ(time[1], scene.time_at(scene.schedule.substeps_per_frame));
   EXPECT_TRUE(std::isnan(time[2]));
+}
+
+TEST(FrameFile, CallsAFrameWrittenOnlyWhenItIsComplete) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene(3);
+  const FrameLayout layout = frame_layout(scene, particles);
+  Frame frame = awkward_frame(scene, layout, 1);
+  const auto places = std::exchange(frame.place, {});
+  FrameFile file = FrameFile::create(folder / "f.h5", scene, layout, {});
+  file.write_values(frame);
+  EXPECT_TRUE(std::isnan(Hdf5Reader(folder / "f.h5").vector("/time", 4)[1]));
+  EXPECT_THROW(file.complete(frame), std::runtime_error);
+  frame.place = places;
+  file.complete(frame);
+  EXPECT_EQ(Hdf5Reader(folder / "f.h5").vector("/time", 4)[1], frame.time);
+  FrameFile::create(folder / "whole.h5", scene, layout, {}).write(frame);
+  EXPECT_TRUE(text_of(folder / "f.h5") == text_of(folder / "whole.h5"));
 }
 
 TEST(FrameFile, KeepsASecondPourOut) {
@@ -242,28 +266,37 @@ TEST(Xdmf, StartsEveryHyperSlabWithItsFrame) {
   EXPECT_EQ(slabs, 4u);  // one moving wall
 }
 
-TEST(FrameWriter, WritesEveryFrameInOrderThoughItsQueueIsShort) {
-  std::vector<std::int64_t> written;
-  FrameWriter writer([&](const Frame& frame) { written.push_back(frame.index); }, 2);
-  for (std::int64_t k = 0; k < 100; ++k) {
-    Frame frame;
-    frame.index = k;
-    writer.push(std::move(frame));
-  }
-  writer.drain();
-  ASSERT_EQ(written.size(), 100u);
-  for (std::int64_t k = 0; k < 100; ++k) EXPECT_EQ(written[static_cast<std::size_t>(k)], k);
+TEST(WorkThread, DoesEveryPieceInOrderThoughItsQueueIsShort) {
+  std::vector<int> done;
+  WorkThread thread(2);
+  for (int k = 0; k < 100; ++k) thread.push([&done, k] { done.push_back(k); });
+  thread.drain();
+  ASSERT_EQ(done.size(), 100u);
+  for (int k = 0; k < 100; ++k) EXPECT_EQ(done[static_cast<std::size_t>(k)], k);
 }
 
-TEST(FrameWriter, HandsAFailureToTheSolverAndWritesNothingAfterIt) {
+TEST(WorkThread, TakesAPieceWhenTheOneBeforeIsDone) {
+  std::atomic<int> done = 0;
+  WorkThread thread;
+  for (int k = 0; k < 20; ++k) {
+    thread.push([&done] {
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      ++done;
+    });
+    EXPECT_GE(done, k);
+  }
+}
+
+TEST(WorkThread, HandsOnAFailureAndDoesNothingAfterIt) {
   std::atomic<int> calls = 0;
-  FrameWriter writer([&](const Frame&) {
+  const auto fail = [&] {
     ++calls;
     throw std::runtime_error("the disk is full");
-  });
-  writer.push({});
-  EXPECT_THROW(writer.drain(), std::runtime_error);
-  EXPECT_THROW(writer.push({}), std::runtime_error);
+  };
+  WorkThread thread(3);
+  thread.push(fail);
+  EXPECT_THROW(thread.drain(), std::runtime_error);
+  EXPECT_THROW(thread.push(fail), std::runtime_error);
   EXPECT_EQ(calls, 1);
 }
 

@@ -265,21 +265,36 @@ void FrameFile::put(std::uint64_t dataset_offset, const void* data, std::size_t 
   }
 }
 
+template <class T>
+void FrameFile::put_row(const std::string& path, const std::vector<T>& values, std::int64_t row) {
+  put(offset_.at(path), values.data(), byte_count(values), row);
+}
+
+void FrameFile::require(bool fits, const Frame& frame) const {
+  if (!fits || frame.index < 0 || frame.index >= frames_)
+    fail(file_, fmt::format("frame {} does not fit its layout", frame.index));
+}
+
 void FrameFile::write(const Frame& frame) {
+  write_values(frame);
+  complete(frame);
+}
+
+void FrameFile::write_values(const Frame& frame) {
   const auto n = static_cast<std::size_t>(particles_);
-  const bool fits = frame.index >= 0 && frame.index < frames_ && frame.position.size() == 3 * n &&
-                    frame.velocity.size() == 3 * n && frame.density.size() == n && frame.pressure.size() == n &&
-                    frame.place.size() == n && frame.wall.size() == moving_.size();
-  if (!fits) fail(file_, fmt::format("frame {} does not fit its layout", frame.index));
-  const auto column = [&](const std::string& path, const auto& values) {
-    put(offset_.at(path), values.data(), byte_count(values), frame.index);
-  };
-  column("/fluid/position", frame.position);
-  column("/fluid/velocity", frame.velocity);
-  column("/fluid/density", frame.density);
-  column("/fluid/pressure", frame.pressure);
-  column("/fluid/place", frame.place);
-  for (std::size_t w = 0; w < moving_.size(); ++w) column(moving_[w], frame.wall[w]);
+  require(frame.position.size() == 3 * n && frame.velocity.size() == 3 * n && frame.density.size() == n &&
+              frame.pressure.size() == n && frame.wall.size() == moving_.size(),
+          frame);
+  put_row("/fluid/position", frame.position, frame.index);
+  put_row("/fluid/velocity", frame.velocity, frame.index);
+  put_row("/fluid/density", frame.density, frame.index);
+  put_row("/fluid/pressure", frame.pressure, frame.index);
+  for (std::size_t w = 0; w < moving_.size(); ++w) put_row(moving_[w], frame.wall[w], frame.index);
+}
+
+void FrameFile::complete(const Frame& frame) {
+  require(frame.place.size() == static_cast<std::size_t>(particles_), frame);
+  put_row("/fluid/place", frame.place, frame.index);
   put(offset_.at("/time"), &frame.time, sizeof frame.time, frame.index);
 }
 

@@ -66,12 +66,19 @@ class FrameFile {
 
   /// Writes one frame, its time last. Throws std::runtime_error where the disk refuses.
   void write(const Frame& frame);
+  /// The same in two parts: all but places and time, for which the places need not be known; and these two, which
+  /// make the frame complete.
+  void write_values(const Frame& frame);
+  void complete(const Frame& frame);
   /// Hands everything written to the disk. Throws std::runtime_error where it refuses.
   void sync();
 
  private:
   FrameFile(std::filesystem::path file, const FrameLayout& layout);
   void put(std::uint64_t dataset_offset, const void* data, std::size_t bytes, std::int64_t row);
+  template <class T>
+  void put_row(const std::string& path, const std::vector<T>& values, std::int64_t row);
+  void require(bool fits, const Frame& frame) const;
 
   std::filesystem::path file_;
   int descriptor_ = -1;

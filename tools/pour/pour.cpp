@@ -2,7 +2,6 @@
 /// The loop over frames, and what surrounds it.
 #include "tools/pour/pour.hpp"
 
-#include "oracle/checks/audit.hpp"
 #include "oracle/files/file_aside.hpp"
 #include "oracle/solution/digest.hpp"
 #include "oracle/solution/fixture.hpp"
@@ -15,12 +14,12 @@
 #include "tools/common/progress.hpp"
 #include "tools/common/stop_watcher.hpp"
 #include "tools/frames/csv_writer.hpp"
-#include "tools/frames/frame_writer.hpp"
 #include "tools/frames/vtkhdf_frames.hpp"
 #include "tools/frames/xdmf.hpp"
 #include "tools/pour/checkpoint.hpp"
 #include "tools/pour/failed_state.hpp"
 #include "tools/pour/folder_lock.hpp"
+#include "tools/pour/frame_sampler.hpp"
 #include "tools/pour/limits.hpp"
 #include "tools/pour/pour_folder.hpp"
 #include "tools/pour/segments.hpp"
@@ -42,25 +41,7 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-/// What a look at walls found, joined to what another one found.
-void keep_worst(AuditResult& all, const AuditResult& one) {
-  if (one.deepest > all.deepest) {
-    all.deepest = one.deepest;
-    all.deepest_particle = one.deepest_particle;
-  }
-  all.inside = std::max(all.inside, one.inside);
-  all.crossed += one.crossed;
-  if (all.first_crossed < 0) all.first_crossed = one.first_crossed;
-  all.max_speed = std::max(all.max_speed, one.max_speed);
-}
-
-std::int64_t fastest_in(const ParticleState& state) {
-  Eigen::Index fastest = -1;
-  if (state.size() > 0) state.velocity.colwise().squaredNorm().maxCoeff(&fastest);
-  return fastest;
-}
-
-bool finite(const ParticleState& state) { return state.position.allFinite() && state.velocity.allFinite(); }
+bool finite(const ParticleState& state) { return all_finite(state.position) && all_finite(state.velocity); }
 
 class Pour {
  public:
@@ -71,7 +52,7 @@ class Pour {
         files_(options.out),
         segments_(scene),
         limits_(limits_of(scene)),
-        audit_(scene) {
+        info_(backend.info()) {
     if (options.stop && options.leave) watcher_.emplace(options.stop, [this] { leave(); });
   }
 
@@ -82,17 +63,19 @@ class Pour {
   void start();
   void resume();
   void open_frames(bool anew);
-  void sample(const Fields& fields);
-  bool next_segment();
-  void tell_limits();
+  void end_frame(Fields fields);
+  void next_segment();
+  void tell(const TimelineRow& row);
+  void tell_limits(const std::vector<TimelineRow>& rows);
   void checkpoint();
   void finish();
+  Timeline timeline() const { return {samples_->rows(), stages_}; }
   PourResult result();
   void leave();
   void check(const Status& status, const ParticleState& good);
   [[noreturn]] void dump(const std::string& trouble, const ParticleState& good);
   double wall_seconds() const { return wall_before_ + seconds_since(started_); }
-  std::int64_t done_in_frame() const { return state_.substep - frame_ * segments_.substeps(); }
+  std::int64_t done_in_frame() const { return state_->substep - frame_ * segments_.substeps(); }
 
   /// A call of the backend's, which a stop does not wait for.
   template <class Call>
@@ -106,16 +89,15 @@ class Pour {
   const PourFiles files_;
   const Segments segments_;
   const SceneLimits limits_;
+  const BackendInfo info_;
   std::optional<FolderLock> lock_;
-  Audit audit_;
   Walls walls_;
   FrameLayout layout_;
-  ParticleState state_;
-  std::int64_t frame_ = 0;  // the last one written
-  PartOfFrame part_;        // of the frame under way
-  Timeline timeline_;
-  StageTimes stages_before_;  // of the sessions before this one
-  double wall_before_ = 0;    // s
+  SharedState state_;
+  std::int64_t frame_ = 0;             // the last one that was reached
+  double solver_seconds_ = 0;          // s, since then
+  StageTimes stages_, stages_before_;  // of all sessions; of those before this one
+  double wall_before_ = 0;             // s
   Clock::time_point started_ = Clock::now(), saved_ = started_;
   double checkpoint_cost_ = 0;     // s, of the last one
   bool begun_ = false;             // a checkpoint of this state can be written
@@ -123,8 +105,8 @@ class Pour {
   std::optional<Progress> progress_;
   std::optional<FrameFile> file_;
   std::optional<CsvWriter> csv_;
-  std::optional<FrameWriter> writer_;   // its thread uses the two above
-  std::optional<StopWatcher> watcher_;  // last: its thread uses all of them
+  std::optional<FrameSampler> samples_;  // its thread uses the four above
+  std::optional<StopWatcher> watcher_;   // last: its thread uses all of them
 };
 
 PourResult Pour::run() {
@@ -133,21 +115,14 @@ PourResult Pour::run() {
   walls_ = call([&] { return sample_walls(scene_); });
   if (options_.resume) resume();
   else start();
-  progress_.emplace("frame", scene_.schedule.frames, frame_, options_.quiet);
-  progress_->update(frame_);
-  tell_limits();
   while (frame_ < scene_.schedule.frames && !(options_.stop && options_.stop())) {
-    if (next_segment()) {
-      const TimelineRow& row = timeline_.rows.back();
-      progress_->update(frame_, fmt::format("t = {:.3f} s, v <= {:.2f} m/s{}", row.time, row.max_speed,
-                                            told_.empty() ? "" : ", BEYOND LIMITS"));
-      tell_limits();
-    }
+    next_segment();
     // Checkpoints take at most a twentieth of the time.
     const double interval =
         options_.checkpoint_seconds > 0 ? std::max(options_.checkpoint_seconds, 20 * checkpoint_cost_) : 0.0;
     if (seconds_since(saved_) >= interval) checkpoint();
   }
+  samples_->drain();
   progress_->pause();
   if (frame_ == scene_.schedule.frames) finish();
   else checkpoint();
@@ -158,10 +133,10 @@ PourResult Pour::result() {
   PourResult r;
   r.finished = frame_ == scene_.schedule.frames;
   r.frame = frame_;
-  r.substep = state_.substep;
-  r.summary = summarise(timeline_, state_.size(), scene_.particle_mass());
-  r.limits_exceeded = limits_exceeded(timeline_.rows, limits_);
-  r.timeline = timeline_;
+  r.substep = state_->substep;
+  r.timeline = timeline();
+  r.summary = summarise(r.timeline, state_->size(), scene_.particle_mass());
+  r.limits_exceeded = limits_exceeded(r.timeline.rows, limits_);
   return r;
 }
 
@@ -169,7 +144,7 @@ PourResult Pour::result() {
 void Pour::leave() {
   PourResult last;
   last.frame = options_.resume ? frame_ : -1;
-  last.substep = state_.substep;
+  last.substep = state_ ? state_->substep : 0;
   try {
     if (begun_) {
       checkpoint();
@@ -189,146 +164,133 @@ void Pour::lock_folder() {
 }
 
 void Pour::start() {
-  state_ = call([&] { return initial_state(scene_); });
-  if (options_.perturbation != 0) state_ = perturbed_start(state_, options_.perturbation);
-  layout_ = frame_layout(scene_, state_.size());
+  ParticleState first = call([&] { return initial_state(scene_); });
+  if (options_.perturbation != 0) first = perturbed_start(first, options_.perturbation);
+  state_ = std::make_shared<const ParticleState>(std::move(first));
+  layout_ = frame_layout(scene_, state_->size());
   check_room(options_, files_, layout_, 0);
   fs::create_directories(options_.out);
   lock_folder();
   check_pour_folder(options_, files_);  // another pour may have made and filled it meanwhile
-  call([&] { backend_.load(scene_, walls_, state_); });
+  call([&] { backend_.load(scene_, walls_, *state_); });
   open_frames(true);
-  Fields fields = Fields::unwritten(state_.size(), walls_.size());
-  check(call([&] { return backend_.evaluate(fields); }), state_);
-  sample(fields);
+  Fields fields = Fields::unwritten(state_->size(), walls_.size());
+  check(call([&] { return backend_.evaluate(fields); }), *state_);
+  end_frame(std::move(fields));
   checkpoint();
   begun_ = true;
 }
 
 void Pour::resume() {
   Checkpoint from = read_checkpoint(files_.checkpoint);
-  check_same_pour(files_.checkpoint, from, scene_, backend_.info(), {options_.csv, options_.perturbation});
-  state_ = std::move(from.state);
+  check_same_pour(files_.checkpoint, from, scene_, info_, {options_.csv, options_.perturbation});
+  state_ = std::make_shared<const ParticleState>(std::move(from.state));
   frame_ = from.frame;
   if (const std::int64_t done = done_in_frame();
       done < 0 || (done > 0) != from.part.has_value() || done >= segments_.substeps() || !segments_.meet_at(done))
-    throw InputError(files_.checkpoint.string(), "substep", std::to_string(state_.substep),
+    throw InputError(files_.checkpoint.string(), "substep", std::to_string(state_->substep),
                      fmt::format("where a segment of frame {} ends", frame_ + 1));
-  timeline_ = std::move(from.timeline);
-  stages_before_ = timeline_.stages;
+  stages_ = stages_before_ = from.timeline.stages;
   wall_before_ = from.wall_seconds;
-  layout_ = frame_layout(scene_, state_.size());
+  layout_ = frame_layout(scene_, state_->size());
   // A pour killed among its last steps has its frames under their final name already.
   if (!fs::exists(files_.partial) && fs::exists(files_.frames)) fs::rename(files_.frames, files_.partial);
   check_room(options_, files_, layout_, frame_ + 1);
-  call([&] { backend_.load(scene_, walls_, state_); });
-  // Paths to the next look start at the last one.
-  if (from.part) part_ = std::move(*from.part);
-  ParticleState sampled = state_;
-  if (from.part) {
-    sampled.substep = part_.looked_at_substep;
-    sampled.position = part_.looked_at;
-  }
-  (void)audit_.sample(sampled);
+  call([&] { backend_.load(scene_, walls_, *state_); });
   open_frames(false);
+  samples_->resume(state_, std::move(from.timeline.rows), from.part);
+  if (from.part) solver_seconds_ = from.part->solver_seconds;
   begun_ = true;
   if (!options_.quiet)
     fmt::print(stderr, "resumes after frame {}{}\n", frame_,
-               from.part ? fmt::format(", at substep {}", state_.substep) : "");
-  if (!options_.quiet && from.backend.device != backend_.info().device)
-    fmt::print(stderr, "started on {}, resumes on {}: the last bits may differ\n", from.backend.device,
-               backend_.info().device);
+               from.part ? fmt::format(", at substep {}", state_->substep) : "");
+  if (!options_.quiet && from.backend.device != info_.device)
+    fmt::print(stderr, "started on {}, resumes on {}: the last bits may differ\n", from.backend.device, info_.device);
+  progress_->update(frame_);
+  tell_limits(samples_->rows());
 }
 
 void Pour::open_frames(bool anew) {
   if (anew) {
-    const BackendInfo info = backend_.info();
     file_.emplace(FrameFile::create(files_.partial, scene_, layout_,
                                     {{"scene_sha256", sha256_of_text(scene_to_json(scene_))},
-                                     {"backend", info.name},
-                                     {"options", info.options},
-                                     {"executor", info.executor},
-                                     {"device", info.device},
-                                     {"precision", info.precision},
+                                     {"backend", info_.name},
+                                     {"options", info_.options},
+                                     {"executor", info_.executor},
+                                     {"device", info_.device},
+                                     {"precision", info_.precision},
                                      {"git_revision", build_provenance().at("git_revision")}}));
   } else {
     file_.emplace(FrameFile::reopen(files_.partial, layout_));
   }
   if (options_.csv) csv_.emplace(files_.csv, scene_, layout_);
-  writer_.emplace([this](const Frame& frame) {
-    file_->write(frame);
-    if (csv_) csv_->write(frame);
-  });
+  progress_.emplace("frame", scene_.schedule.frames, frame_, options_.quiet);
+  samples_.emplace(scene_, layout_,
+                   FrameSampler::Outputs{[this](const Frame& frame) {
+                                           file_->write_values(frame);
+                                           if (csv_) csv_->write(frame);
+                                         },
+                                         [this](const Frame& frame) { file_->complete(frame); },
+                                         [this](const TimelineRow& row) { tell(row); }});
 }
 
-/// What there is to say of the frame that was reached.
-void Pour::sample(const Fields& fields) {
-  AuditResult audit = audit_.sample(state_);
-  const bool fastest_now = audit.max_speed >= part_.on_the_way.max_speed;
-  keep_worst(audit, part_.on_the_way);
-  TimelineRow row;
+/// Hands the frame that was reached to the sampler.
+void Pour::end_frame(Fields fields) {
   try {
-    row = timeline_row(frame_, scene_, state_, fields, audit);
+    require_finite(fields, state_->substep);
   } catch (const BackendError& trouble) {
-    dump(trouble.what(), state_);
+    dump(trouble.what(), *state_);
   }
-  row.fastest_particle = fastest_now ? fastest_in(state_) : part_.fastest_particle;
-  row.solver_seconds = part_.solver_seconds;
-  row.wall_seconds = wall_seconds();
-  timeline_.rows.push_back(row);
-  writer_->push(make_frame(scene_, layout_, frame_, state_, fields, audit));
-  part_ = {};
+  samples_->end_of_frame(state_, std::move(fields), {frame_, solver_seconds_, wall_seconds()});
+  solver_seconds_ = 0;
 }
 
-/// Whether it ended a frame.
-bool Pour::next_segment() {
-  const std::int64_t done = done_in_frame(), end = segments_.end_of(done), expected = state_.substep + end - done;
-  if (done == 0) {
-    part_.looked_at = state_.position;
-    part_.looked_at_substep = state_.substep;
-  }
+void Pour::next_segment() {
+  const std::int64_t done = done_in_frame(), end = segments_.end_of(done), expected = state_->substep + end - done;
   const bool whole = end == segments_.substeps();
   double seconds = 0;
-  ParticleState next;
+  auto next = std::make_shared<ParticleState>();
   Fields fields;
-  if (whole) fields = Fields::unwritten(state_.size(), walls_.size());
+  if (whole) fields = samples_->unwritten(state_->size(), walls_.size());
   Status advanced, evaluated;
+  bool next_finite = false;
   // What stands here stays as it was until all of it is done.
   call([&] {
     const auto before = Clock::now();
     advanced = backend_.advance(static_cast<int>(end - done));
     seconds = seconds_since(before);
     if (!advanced.ok()) return;
-    backend_.read(next);
-    if (whole && finite(next)) evaluated = backend_.evaluate(fields);
+    backend_.read(*next);
+    next_finite = finite(*next);
+    if (whole && next_finite) evaluated = backend_.evaluate(fields);
   });
-  check(advanced, state_);
-  if (next.substep != expected || next.size() != state_.size())
-    throw BackendError(fmt::format("{}: {} particles at substep {} instead of {} at {}", backend_.info().name,
-                                   next.size(), next.substep, state_.size(), expected));
-  if (!finite(next)) check({Status::non_finite, -1, next.substep}, state_);
+  check(advanced, *state_);
+  if (next->substep != expected || next->size() != state_->size())
+    throw BackendError(fmt::format("{}: {} particles at substep {} instead of {} at {}", info_.name, next->size(),
+                                   next->substep, state_->size(), expected));
+  if (!next_finite) check({Status::non_finite, -1, next->substep}, *state_);
   state_ = std::move(next);
-  part_.solver_seconds += seconds;
-  timeline_.stages = stages_before_ + backend_.stage_times();
+  solver_seconds_ += seconds;
+  stages_ = stages_before_ + backend_.stage_times();
   if (whole) {
-    check(evaluated, state_);
+    check(evaluated, *state_);
     ++frame_;
-    sample(fields);
-    return true;
+    end_frame(std::move(fields));
+  } else if (segments_.samples_at(end)) {
+    samples_->within_frame(state_);
   }
-  if (segments_.samples_at(end)) {
-    const AuditResult seen = audit_.sample(state_);
-    if (seen.max_speed > part_.on_the_way.max_speed) part_.fastest_particle = fastest_in(state_);
-    keep_worst(part_.on_the_way, seen);
-    part_.looked_at = state_.position;
-    part_.looked_at_substep = state_.substep;
-  }
-  return false;
+}
+
+/// By the sampler's thread.
+void Pour::tell(const TimelineRow& row) {
+  progress_->update(row.frame, fmt::format("t = {:.3f} s, v <= {:.2f} m/s{}", row.time, row.max_speed,
+                                           told_.empty() ? "" : ", BEYOND LIMITS"));
+  tell_limits({row});
 }
 
 /// Once for each limit, when it is first passed.
-void Pour::tell_limits() {
-  for (const LimitExceeded& e : limits_exceeded(timeline_.rows, limits_)) {
+void Pour::tell_limits(const std::vector<TimelineRow>& rows) {
+  for (const LimitExceeded& e : limits_exceeded(rows, limits_)) {
     if (std::find(told_.begin(), told_.end(), e.limit) != told_.end()) continue;
     told_.push_back(e.limit);
     if (options_.quiet) continue;
@@ -339,34 +301,30 @@ void Pour::tell_limits() {
 
 void Pour::checkpoint() {
   const auto before = Clock::now();
-  writer_->drain();
+  samples_->drain();
   file_->sync();
-  Checkpoint now{frame_,
-                 state_,
-                 timeline_,
-                 {},
-                 {options_.csv, options_.perturbation},
-                 wall_seconds(),
-                 scene_to_json(scene_),
-                 backend_.info()};
-  if (done_in_frame() > 0) now.part = part_;
+  Checkpoint now{
+      frame_, *state_, timeline(), {}, {options_.csv, options_.perturbation}, wall_seconds(), scene_to_json(scene_),
+      info_};
+  if (done_in_frame() > 0) {
+    now.part = samples_->part_of_frame();
+    now.part->solver_seconds = solver_seconds_;
+  }
   write_checkpoint(files_.checkpoint, now);
   saved_ = Clock::now();
   checkpoint_cost_ = std::chrono::duration<double>(saved_ - before).count();
 }
 
 void Pour::finish() {
-  writer_->drain();
   file_->sync();
-  const BackendInfo info = backend_.info();
-  write_timeline(files_.timeline, timeline_, scene_to_json(scene_),
-                 {{"backend", info.name},
-                  {"options", info.options},
-                  {"executor", info.executor},
-                  {"device", info.device},
-                  {"precision", info.precision}});
+  write_timeline(files_.timeline, timeline(), scene_to_json(scene_),
+                 {{"backend", info_.name},
+                  {"options", info_.options},
+                  {"executor", info_.executor},
+                  {"device", info_.device},
+                  {"precision", info_.precision}});
   std::vector<double> times;
-  for (const TimelineRow& row : timeline_.rows) times.push_back(row.time);
+  for (const TimelineRow& row : samples_->rows()) times.push_back(row.time);
   fs::rename(files_.partial, files_.frames);
   const std::string data_file = files_.frames.filename().string();
   write_text_file(files_.frames_xdmf, frames_xdmf(layout_, times, data_file));
@@ -382,8 +340,9 @@ void Pour::check(const Status& status, const ParticleState& good) {
 }
 
 void Pour::dump(const std::string& trouble, const ParticleState& good) {
-  throw BackendError(fmt::format("{} on {}: {}{}", backend_.info().name, backend_.info().executor, trouble,
-                                 save_failed_state(files_.failed, scene_, good, backend_.info(), trouble)));
+  if (samples_) samples_->drain();
+  throw BackendError(fmt::format("{} on {}: {}{}", info_.name, info_.executor, trouble,
+                                 save_failed_state(files_.failed, scene_, good, info_, trouble)));
 }
 
 }  // namespace

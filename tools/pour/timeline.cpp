@@ -56,12 +56,16 @@ Values column(const Rows& rows, Get get) {
 
 }  // namespace
 
+void require_finite(const Fields& fields, std::int64_t substep) {
+  if (all_finite(fields.density) && all_finite(fields.pressure)) return;
+  for (Eigen::Index i = 0; i < fields.density.size(); ++i)
+    if (!std::isfinite(fields.density[i]) || !std::isfinite(fields.pressure[i]))
+      throw BackendError(fmt::format("particle {}, substep {}: density {}, pressure {}", i, substep, fields.density[i],
+                                     fields.pressure[i]));
+}
+
 TimelineRow timeline_row(std::int64_t frame, const Scene& scene, const ParticleState& state, const Fields& fields,
                          const AuditResult& audit) {
-  for (Eigen::Index i = 0; i < state.size(); ++i)
-    if (!std::isfinite(fields.density[i]) || !std::isfinite(fields.pressure[i]))
-      throw BackendError(fmt::format("particle {}, substep {}: density {}, pressure {}", i, state.substep,
-                                     fields.density[i], fields.pressure[i]));
   TimelineRow row;
   row.frame = frame;
   row.substep = state.substep;

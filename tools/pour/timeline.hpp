@@ -33,7 +33,16 @@ struct TimelineRow {
   double wall_seconds = 0;    // s, wall time since the start, all sessions together
 };
 
-/// The row of one state. Throws BackendError where a density or a pressure is not finite.
+/// Whether no value is NaN or infinite, in one pass without a branch: their differences with themselves add up to 0.
+template <class Values>
+bool all_finite(const Values& values) {
+  return (values - values).sum() == 0.0;
+}
+
+/// Throws BackendError naming the particle where a density or a pressure is not finite.
+void require_finite(const Fields& fields, std::int64_t substep);
+
+/// The row of one state.
 TimelineRow timeline_row(std::int64_t frame, const Scene& scene, const ParticleState& state, const Fields& fields,
                          const AuditResult& audit);
 
