@@ -267,7 +267,13 @@ void FrameFile::put(std::uint64_t dataset_offset, const void* data, std::size_t 
 
 template <class T>
 void FrameFile::put_row(const std::string& path, const std::vector<T>& values, std::int64_t row) {
-  put(offset_.at(path), values.data(), byte_count(values), row);
+  const std::uint64_t offset = offset_.at(path);
+  put(offset, values.data(), byte_count(values), row);
+  // The kernel would begin to write once much has gathered, and the end of the pour would wait for that. Where it
+  // does not take the hint nothing is lost.
+  (void)::sync_file_range(descriptor_,
+                          static_cast<off_t>(offset + static_cast<std::uint64_t>(row) * byte_count(values)),
+                          static_cast<off_t>(byte_count(values)), SYNC_FILE_RANGE_WRITE);
 }
 
 void FrameFile::require(bool fits, const Frame& frame) const {
