@@ -15,6 +15,7 @@
 #include "tools/pour/checkpoint.hpp"
 #include "tools/pour/frame_sampler.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
@@ -282,6 +283,23 @@ TEST(Pour, IsRefusedBeforeAnyWorkWhereTheDiskIsTooSmall) {
   EXPECT_NE(error.bound().find("needs"), std::string::npos);
   EXPECT_NE(error.bound().find("free"), std::string::npos);
   EXPECT_FALSE(fs::exists(folder / "out"));
+}
+
+TEST(Pour, SaysBeforeTheFirstFrameHowMuchItWrites) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene();
+  FallingPoints backend;
+  PourOptions options = quiet_options(folder / "out");
+  options.quiet = false;
+  testing::internal::CaptureStderr();
+  const PourResult result = pour(scene, backend, options);
+  const std::string said = testing::internal::GetCapturedStderr();
+  const std::string per_frame =
+      fmt::format("{:.1f} kB", 1e-3 * double(frame_file_bytes(frame_layout(scene, 180))) / 13);
+  EXPECT_EQ(said.find("disk: 13 frames of " + per_frame + ", needs "), 0u) << said;
+  EXPECT_LT(said.find(" free\n"), said.find("frame 0/12")) << said;
+  EXPECT_GE(result.fields_seconds, 0);
+  EXPECT_GE(result.wait_seconds, 0);
 }
 
 TEST(Pour, SavesTheLastGoodStateWhereTheBackendReportsTrouble) {

@@ -83,6 +83,14 @@ class Pour {
     return watcher_ ? watcher_->during(what) : what();
   }
 
+  /// A call of the sampler's.
+  template <class Call>
+  void waiting(Call what) {
+    const auto before = Clock::now();
+    what();
+    wait_seconds_ += seconds_since(before);
+  }
+
   const Scene& scene_;
   Backend& backend_;
   const PourOptions& options_;
@@ -94,8 +102,9 @@ class Pour {
   Walls walls_;
   FrameLayout layout_;
   SharedState state_;
-  std::int64_t frame_ = 0;             // the last one that was reached
-  double solver_seconds_ = 0;          // s, since then
+  std::int64_t frame_ = 0;     // the last one that was reached
+  double solver_seconds_ = 0;  // s, since then
+  double fields_seconds_ = 0, wait_seconds_ = 0;
   StageTimes stages_, stages_before_;  // of all sessions; of those before this one
   double wall_before_ = 0;             // s
   Clock::time_point started_ = Clock::now(), saved_ = started_;
@@ -122,7 +131,7 @@ PourResult Pour::run() {
         options_.checkpoint_seconds > 0 ? std::max(options_.checkpoint_seconds, 20 * checkpoint_cost_) : 0.0;
     if (seconds_since(saved_) >= interval) checkpoint();
   }
-  samples_->drain();
+  waiting([&] { samples_->drain(); });
   progress_->pause();
   if (frame_ == scene_.schedule.frames) finish();
   else checkpoint();
@@ -134,6 +143,8 @@ PourResult Pour::result() {
   r.finished = frame_ == scene_.schedule.frames;
   r.frame = frame_;
   r.substep = state_->substep;
+  r.fields_seconds = fields_seconds_;
+  r.wait_seconds = wait_seconds_;
   r.timeline = timeline();
   r.summary = summarise(r.timeline, state_->size(), scene_.particle_mass());
   r.limits_exceeded = limits_exceeded(r.timeline.rows, limits_);
@@ -241,14 +252,15 @@ void Pour::end_frame(Fields fields) {
   } catch (const BackendError& trouble) {
     dump(trouble.what(), *state_);
   }
-  samples_->end_of_frame(state_, std::move(fields), {frame_, solver_seconds_, wall_seconds()});
+  const FrameTimes times{frame_, solver_seconds_, wall_seconds()};
+  waiting([&] { samples_->end_of_frame(state_, std::move(fields), times); });
   solver_seconds_ = 0;
 }
 
 void Pour::next_segment() {
   const std::int64_t done = done_in_frame(), end = segments_.end_of(done), expected = state_->substep + end - done;
   const bool whole = end == segments_.substeps();
-  double seconds = 0;
+  double seconds = 0, reading = 0;
   auto next = std::make_shared<ParticleState>();
   Fields fields;
   if (whole) fields = samples_->unwritten(state_->size(), walls_.size());
@@ -263,6 +275,7 @@ void Pour::next_segment() {
     backend_.read(*next);
     next_finite = finite(*next);
     if (whole && next_finite) evaluated = backend_.evaluate(fields);
+    reading = seconds_since(before) - seconds;
   });
   check(advanced, *state_);
   if (next->substep != expected || next->size() != state_->size())
@@ -271,13 +284,14 @@ void Pour::next_segment() {
   if (!next_finite) check({Status::non_finite, -1, next->substep}, *state_);
   state_ = std::move(next);
   solver_seconds_ += seconds;
+  fields_seconds_ += reading;
   stages_ = stages_before_ + backend_.stage_times();
   if (whole) {
     check(evaluated, *state_);
     ++frame_;
     end_frame(std::move(fields));
   } else if (segments_.samples_at(end)) {
-    samples_->within_frame(state_);
+    waiting([&] { samples_->within_frame(state_); });
   }
 }
 

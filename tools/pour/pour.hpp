@@ -36,9 +36,11 @@ struct PourOptions {
 };
 
 struct PourResult {
-  bool finished = false;     // false: stopped, a checkpoint lies in the folder
-  std::int64_t frame = 0;    // the last one written
-  std::int64_t substep = 0;  // of the checkpoint, maybe within the next frame
+  bool finished = false;      // false: stopped, a checkpoint lies in the folder
+  std::int64_t frame = 0;     // the last one written
+  std::int64_t substep = 0;   // of the checkpoint, maybe within the next frame
+  double fields_seconds = 0;  // s, of this session: reading states and evaluating the fields of frames
+  double wait_seconds = 0;    // s, of this session: waiting until frames were looked at and written
   std::vector<LimitExceeded> limits_exceeded;
   Timeline timeline;
   PourSummary summary;

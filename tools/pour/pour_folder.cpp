@@ -21,7 +21,8 @@ std::int64_t bytes_on_disk(const fs::path& file) {
 }
 
 std::string size_text(double bytes) {
-  return bytes >= 1e9 ? fmt::format("{:.1f} GB", 1e-9 * bytes) : fmt::format("{:.1f} MB", 1e-6 * bytes);
+  if (bytes >= 1e9) return fmt::format("{:.1f} GB", 1e-9 * bytes);
+  return bytes >= 1e6 ? fmt::format("{:.1f} MB", 1e-6 * bytes) : fmt::format("{:.1f} kB", 1e-3 * bytes);
 }
 
 }  // namespace
@@ -51,7 +52,11 @@ void check_room(const PourOptions& options, const PourFiles& files, const FrameL
   fs::path there = fs::absolute(options.out);
   while (!fs::exists(there) && there.has_relative_path()) there = there.parent_path();
   const auto available = static_cast<double>(fs::space(there).available);
-  if (!options.quiet) fmt::print(stderr, "disk: needs {}, {} free\n", size_text(needed), size_text(available));
+  const std::int64_t all_frames = frame_file_bytes(layout) + (options.csv ? csv_bytes(layout) : 0);
+  if (!options.quiet)
+    fmt::print(stderr, "disk: {} frames of {}, needs {}, {} free\n", layout.frames - frames_done,
+               size_text(static_cast<double>(all_frames) / static_cast<double>(layout.frames)), size_text(needed),
+               size_text(available));
   if (!(needed <= available))
     throw InputError("command line", "--out", options.out.string(),
                      fmt::format("needs {}, free are {}", size_text(needed), size_text(available)));

@@ -59,6 +59,8 @@ std::string pour_json(const PourResult& result, const BackendInfo& info, const s
       {"within_limits", result.limits_exceeded.empty()},
       {"limits_exceeded", exceeded},
       {"solver_seconds", s.solver_seconds},
+      {"fields_seconds", result.fields_seconds},
+      {"wait_seconds", result.wait_seconds},
       {"wall_seconds", s.wall_seconds},
       {"substep_us", 1e6 * s.seconds_per_substep},
       {"stages", stages},
@@ -93,6 +95,8 @@ void print_pour(const PourResult& result, const BackendInfo& info, const Scene& 
     if (const StageTimes::Stage& time = result.timeline.stages.*stage.stage; time.calls > 0)
       fmt::print(", {} {:.4g}", stage.name, 1e6 * time.seconds / static_cast<double>(time.calls));
   fmt::print("\n");
+  fmt::print("  beside it  fields of frames {:.3g} s, waiting for audit and disk {:.3g} s\n", result.fields_seconds,
+             result.wait_seconds);
 }
 
 }  // namespace decant
