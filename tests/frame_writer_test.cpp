@@ -198,6 +198,25 @@ TEST(CsvWriter, WritesNumbersThatReadBackAsTheSameFloats) {
   }
 }
 
+/// More than one task formats.
+TEST(CsvWriter, WritesManyParticlesInTheirOrder) {
+  const TemporaryFolder folder;
+  const Scene scene = test::falling_points_scene(3);
+  const std::size_t n = 10'001;
+  Frame frame = awkward_frame(scene, frame_layout(scene, particles), 1);
+  frame.density.resize(n);
+  for (std::size_t i = 0; i < n; ++i) frame.density[i] = static_cast<float>(i);
+  for (auto* values : {&frame.position, &frame.velocity}) values->resize(3 * n);
+  frame.pressure.resize(n);
+  CsvWriter(folder / "csv", scene, frame_layout(scene, n)).write(frame);
+  const auto rows = csv_rows(folder / "csv/fluid_000001.csv");
+  ASSERT_EQ(rows.size(), 1 + n);
+  for (std::size_t i = 0; i < n; ++i) {
+    ASSERT_EQ(rows[1 + i][0], std::to_string(i));
+    ASSERT_EQ(rows[1 + i][7], std::to_string(i));
+  }
+}
+
 TEST(CsvWriter, KeepsMovingAndFixedWallsApartAndCountsTheirIdsThrough) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene(3);

@@ -7,8 +7,12 @@
 
 #include <fmt/compile.h>
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <iterator>
+#include <utility>
+#include <vector>
 
 namespace decant {
 namespace {
@@ -16,46 +20,64 @@ namespace {
 // Measured on poured frames; only the disk estimate depends on them.
 constexpr std::int64_t bytes_per_particle = 100, bytes_per_vertex = 40;
 
-void append_points(fmt::memory_buffer& out, std::int64_t first_id, const std::vector<float>& xyz) {
-  for (std::size_t p = 0; 3 * p < xyz.size(); ++p)
-    fmt::format_to(std::back_inserter(out), FMT_COMPILE("{},{},{},{}\n"), first_id + static_cast<std::int64_t>(p),
-                   xyz[3 * p], xyz[3 * p + 1], xyz[3 * p + 2]);
+// Lines that one task formats.
+constexpr std::size_t lines_per_chunk = 4096;
+
+using Chunks = std::vector<fmt::memory_buffer>;
+
+/// Lines 0 … count − 1, formatted in parallel. \param append  adds one to a buffer
+template <class Append>
+Chunks lines(std::size_t count, Append append) {
+  Chunks chunks((count + lines_per_chunk - 1) / lines_per_chunk);
+  tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) {
+    for (std::size_t k = c * lines_per_chunk; k < std::min(count, (c + 1) * lines_per_chunk); ++k) append(chunks[c], k);
+  });
+  return chunks;
 }
 
-void append_text(fmt::memory_buffer& out, std::string_view text) { out.append(text.data(), text.data() + text.size()); }
+Chunks points(std::int64_t first_id, const std::vector<float>& xyz) {
+  return lines(xyz.size() / 3, [&](fmt::memory_buffer& out, std::size_t p) {
+    fmt::format_to(std::back_inserter(out), FMT_COMPILE("{},{},{},{}\n"), first_id + static_cast<std::int64_t>(p),
+                   xyz[3 * p], xyz[3 * p + 1], xyz[3 * p + 2]);
+  });
+}
+
+void put(FileAside& out, const Chunks& chunks) {
+  for (const fmt::memory_buffer& chunk : chunks) out.write({chunk.data(), chunk.size()});
+}
 
 }  // namespace
 
 CsvWriter::CsvWriter(std::filesystem::path folder, const Scene& scene, const FrameLayout& layout)
     : folder_(std::move(folder)) {
   std::filesystem::create_directories(folder_);
-  fmt::memory_buffer text;
-  append_text(text, "id,x,y,z\n");
+  FileAside out(folder_ / "boundary_static.csv");
+  out.write("id,x,y,z\n");
   std::int64_t id = 0;
   for (std::size_t c = 0; c < layout.walls.size(); ++c) {
     const RenderWall& wall = layout.walls[c];
     if (wall.moving) first_id_.push_back(id);
-    else append_points(text, id, posed_vertices(scene.containers.at(c), wall.surface, 0.0));
+    else put(out, points(id, posed_vertices(scene.containers.at(c), wall.surface, 0.0)));
     id += wall.surface.vertex.cols();
   }
-  write_text_file(folder_ / "boundary_static.csv", {text.data(), text.size()});
+  out.commit();
 }
 
 void CsvWriter::write(const Frame& frame) const {
-  fmt::memory_buffer text;
-  append_text(text, "id,x,y,z,vx,vy,vz,density,pressure\n");
-  for (std::size_t i = 0; i < frame.density.size(); ++i) {
-    const float* x = &frame.position[3 * i];
-    const float* v = &frame.velocity[3 * i];
-    fmt::format_to(std::back_inserter(text), FMT_COMPILE("{},{},{},{},{},{},{},{},{}\n"), i, x[0], x[1], x[2], v[0],
-                   v[1], v[2], frame.density[i], frame.pressure[i]);
-  }
-  write_text_file(folder_ / fmt::format("fluid_{:06}.csv", frame.index), {text.data(), text.size()});
+  FileAside fluid(folder_ / fmt::format("fluid_{:06}.csv", frame.index));
+  fluid.write("id,x,y,z,vx,vy,vz,density,pressure\n");
+  put(fluid, lines(frame.density.size(), [&](fmt::memory_buffer& out, std::size_t i) {
+        const float* x = &frame.position[3 * i];
+        const float* v = &frame.velocity[3 * i];
+        fmt::format_to(std::back_inserter(out), FMT_COMPILE("{},{},{},{},{},{},{},{},{}\n"), i, x[0], x[1], x[2], v[0],
+                       v[1], v[2], frame.density[i], frame.pressure[i]);
+      }));
+  fluid.commit();
   if (first_id_.empty()) return;
-  text.clear();
-  append_text(text, "id,x,y,z\n");
-  for (std::size_t w = 0; w < first_id_.size(); ++w) append_points(text, first_id_[w], frame.wall.at(w));
-  write_text_file(folder_ / fmt::format("boundary_{:06}.csv", frame.index), {text.data(), text.size()});
+  FileAside walls(folder_ / fmt::format("boundary_{:06}.csv", frame.index));
+  walls.write("id,x,y,z\n");
+  for (std::size_t w = 0; w < first_id_.size(); ++w) put(walls, points(first_id_[w], frame.wall.at(w)));
+  walls.commit();
 }
 
 std::int64_t csv_bytes(const FrameLayout& layout) {
