@@ -165,11 +165,14 @@ TEST(Pour, StoppedAndResumedEndsInTheSameBits) {
 TEST(Pour, KilledAnywhereLeavesReadableFramesAndResumesToTheSameBits) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene();
+  // Beside the threads of "host" no frame is written.
   FallingPoints whole;
+  whole.info_.executor = "cuda";
   pour(scene, whole, quiet_options(folder / "whole"));
   for (const std::int64_t deadly : {0, 15, 40, 55}) {
     const fs::path out = folder / ("out" + std::to_string(deadly));
     FallingPoints dying, second;
+    dying.info_ = second.info_ = whole.info_;
     dying.before_advance = [&](std::int64_t substep) {
       if (substep == deadly) ::raise(SIGKILL);
     };

@@ -254,6 +254,8 @@ void Pour::end_frame(Fields fields) {
   }
   const FrameTimes times{frame_, solver_seconds_, wall_seconds()};
   waiting([&] { samples_->end_of_frame(state_, std::move(fields), times); });
+  // Its threads are as many as there are cores, and share a substep evenly: what delays one delays all.
+  if (info_.executor == "host") waiting([&] { samples_->drain(); });
   solver_seconds_ = 0;
 }
 
