@@ -2,7 +2,7 @@
 /// The table of backends, and the host side they share: scene data in, id-ordered Eigen data out.
 #include "gpu/backends.hpp"
 
-#include "gpu/device_solver.hpp"
+#include "gpu/solver/device_solver.hpp"
 #include "reference/error.hpp"
 #include "reference/scene.hpp"
 #include "reference/state.hpp"
@@ -22,9 +22,9 @@ struct Entry {
 };
 
 #if DECANT_HAS_CUDA
-#define DECANT_ENTRY(name, Search) {#name, gpu::host::make_##name, gpu::cuda::make_##name},
+#define DECANT_ENTRY(name) {#name, gpu::host::make_##name, gpu::cuda::make_##name},
 #else
-#define DECANT_ENTRY(name, Search) {#name, gpu::host::make_##name, nullptr},
+#define DECANT_ENTRY(name) {#name, gpu::host::make_##name, nullptr},
 #endif
 
 const Entry table[] = {DECANT_BACKENDS(DECANT_ENTRY)};
@@ -42,13 +42,11 @@ std::vector<float> values_of(const Eigen::VectorXd& v) {
 }
 
 Eigen::Matrix3Xd matrix_of(const std::vector<float>& rows) {
-  return Eigen::Map<const FloatRows>(rows.data(), 3, static_cast<Eigen::Index>(rows.size() / 3))
-      .cast<double>();
+  return Eigen::Map<const FloatRows>(rows.data(), 3, static_cast<Eigen::Index>(rows.size() / 3)).cast<double>();
 }
 
 Eigen::VectorXd vector_of(const std::vector<float>& values) {
-  return Eigen::Map<const Eigen::VectorXf>(values.data(), static_cast<Eigen::Index>(values.size()))
-      .cast<double>();
+  return Eigen::Map<const Eigen::VectorXf>(values.data(), static_cast<Eigen::Index>(values.size())).cast<double>();
 }
 
 IdVector ids_of(const std::vector<std::int64_t>& ids) {
@@ -57,32 +55,24 @@ IdVector ids_of(const std::vector<std::int64_t>& ids) {
 
 class DeviceBackend : public Backend {
  public:
-  DeviceBackend(std::string name, Executor executor, std::string options,
-                std::unique_ptr<DeviceSolver> solver)
-      : name_(std::move(name)),
-        executor_(executor),
-        options_(std::move(options)),
-        solver_(std::move(solver)) {}
+  DeviceBackend(std::string name, Executor executor, std::string options, std::unique_ptr<DeviceSolver> solver)
+      : name_(std::move(name)), executor_(executor), options_(std::move(options)), solver_(std::move(solver)) {}
 
   BackendInfo info() const override {
-    return {name_, options_, executor_ == Executor::cuda ? "cuda" : "host",
-            executor_device(executor_), "fp32"};
+    return {name_, options_, executor_ == Executor::cuda ? "cuda" : "host", executor_device(executor_), "fp32"};
   }
 
   void load(const Scene& scene, const Walls& walls, const ParticleState& state) override {
     scene_ = scene;
     substep_ = state.substep;
-    gpu::Problem problem{gpu::make_constants(scene), gpu::make_geometry(scene),
-                         gpu::make_region(scene), gpu::make_wall_samples(scene, walls), rows_of(state.position),
-                         rows_of(state.velocity)};
+    gpu::Problem problem{gpu::make_constants(scene),           gpu::make_geometry(scene), gpu::make_region(scene),
+                         gpu::make_wall_samples(scene, walls), rows_of(state.position),   rows_of(state.velocity)};
     solver_->load(problem);
   }
 
   Status evaluate(Fields& out, const StageInputs* given) override {
     gpu::GivenInputs inputs;
-    if (given)
-      inputs = {values_of(given->boundary_volume), values_of(given->density),
-                values_of(given->pressure)};
+    if (given) inputs = {values_of(given->boundary_volume), values_of(given->density), values_of(given->pressure)};
     gpu::HostFields fields;
     Status status = solver_->evaluate(gpu::make_poses(scene(), substep_, 1), inputs, fields);
     out.boundary_volume = vector_of(fields.boundary_volume);
@@ -106,8 +96,7 @@ class DeviceBackend : public Backend {
   }
 
   Status advance(int substeps) override {
-    Status status =
-        solver_->advance(substeps, gpu::make_poses(scene(), substep_, substeps + 1));
+    Status status = solver_->advance(substeps, gpu::make_poses(scene(), substep_, substeps + 1));
     if (!status.ok()) status.substep += substep_;
     substep_ += substeps;
     return status;
@@ -174,18 +163,15 @@ std::string thrust_version() { return gpu::host::thrust_version(); }
 
 std::unique_ptr<Backend> backend_around(std::string name, Executor executor, std::string options,
                                         std::unique_ptr<DeviceSolver> solver) {
-  return std::make_unique<DeviceBackend>(std::move(name), executor, std::move(options),
-                                         std::move(solver));
+  return std::make_unique<DeviceBackend>(std::move(name), executor, std::move(options), std::move(solver));
 }
 
-std::unique_ptr<Backend> make_backend(std::string_view name, Executor executor,
-                                      const std::string& options) {
+std::unique_ptr<Backend> make_backend(std::string_view name, Executor executor, const std::string& options) {
   for (const Entry& entry : table) {
     if (name != entry.name) continue;
     const gpu::SolverOptions parsed = gpu::parse_options(entry.name, options);
     std::string why_not;
-    if (!executor_available(executor, &why_not))
-      throw BackendError("executor cuda: " + why_not);
+    if (!executor_available(executor, &why_not)) throw BackendError("executor cuda: " + why_not);
     const auto make = executor == Executor::host ? entry.host : entry.cuda;
     return backend_around(entry.name, executor, options, make(parsed));
   }

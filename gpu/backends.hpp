@@ -35,7 +35,6 @@ std::unique_ptr<Backend> backend_around(std::string name, Executor executor, std
                                         std::unique_ptr<gpu::DeviceSolver> solver);
 
 /// Throws InputError for an unknown name or option, BackendError where the executor is missing.
-std::unique_ptr<Backend> make_backend(std::string_view name, Executor executor,
-                                      const std::string& options = {});
+std::unique_ptr<Backend> make_backend(std::string_view name, Executor executor, const std::string& options = {});
 
 }  // namespace decant

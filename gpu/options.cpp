@@ -12,19 +12,16 @@
 namespace decant::gpu {
 namespace {
 
-[[noreturn]] void refuse(const std::string& key, const std::string& value,
-                         const std::string& bound) {
+[[noreturn]] void refuse(const std::string& key, const std::string& value, const std::string& bound) {
   throw InputError("command line", "--" + key, value, bound);
 }
 
 template <class Number>
-Number number(const std::string& key, const std::string& text, Number least, Number most,
-              const std::string& bound) {
+Number number(const std::string& key, const std::string& text, Number least, Number most, const std::string& bound) {
   Number value{};
   const char* end = text.data() + text.size();
   const auto [stopped, error] = std::from_chars(text.data(), end, value);
-  if (error != std::errc() || stopped != end || !(value >= least && value <= most))
-    refuse(key, text, bound);
+  if (error != std::errc() || stopped != end || !(value >= least && value <= most)) refuse(key, text, bound);
   return value;
 }
 
@@ -55,9 +52,10 @@ void set_threads(O& o, const std::string& v) {
 }
 
 void set_launch(O& o, const std::string& v) {
-  o.launch = one_of<O::Launch>("launch", v, {{"auto", "auto", O::Launch::automatic},
-                                             {"graph", "graphs", O::Launch::graphs},
-                                             {"stream", "plain", O::Launch::plain}});
+  o.launch = one_of<O::Launch>("launch", v,
+                               {{"auto", "auto", O::Launch::automatic},
+                                {"graph", "graphs", O::Launch::graphs},
+                                {"stream", "plain", O::Launch::plain}});
 }
 
 void set_capacity(O& o, const std::string& v) {
@@ -78,38 +76,39 @@ const std::vector<Entry>& entries() {
       {{"hash", "moving_walls", "source", "body_frame, rebuilt",
         "looked up in the container's frame, or sorted anew every substep", true},
        [](O& o, const std::string& v) {
-         o.source = one_of<O::Source>("moving_walls", v, {{"body_frame", "frame", O::Source::frame},
-                                                          {"rebuilt", "rebuilt", O::Source::rebuilt}});
+         o.source =
+             one_of<O::Source>("moving_walls", v,
+                               {{"body_frame", "frame", O::Source::frame}, {"rebuilt", "rebuilt", O::Source::rebuilt}});
        }},
       {{"hash", "sort", "sort", "counting, thrust", "how particles come into the order of their cells", true},
        [](O& o, const std::string& v) {
-         o.sort = one_of<O::Sort>("sort", v, {{"counting", "counting", O::Sort::counting},
-                                              {"thrust", "thrust", O::Sort::thrust}});
+         o.sort = one_of<O::Sort>("sort", v,
+                                  {{"counting", "counting", O::Sort::counting}, {"thrust", "thrust", O::Sort::thrust}});
        }},
       {{"hash", "force_neighbors", "pairs", "cached, recomputed",
         "the force pass reads the pairs that were found, or searches again", true},
        [](O& o, const std::string& v) {
-         o.pairs = one_of<O::Pairs>("force_neighbors", v, {{"cached", "keep", O::Pairs::keep},
-                                                           {"recomputed", "rescan", O::Pairs::rescan}});
+         o.pairs = one_of<O::Pairs>("force_neighbors", v,
+                                    {{"cached", "keep", O::Pairs::keep}, {"recomputed", "rescan", O::Pairs::rescan}});
        }},
       {{"list", "build", "build", "grid, all-pairs", "lists from cells, or from all pairs", true},
        [](O& o, const std::string& v) {
-         o.build = one_of<O::Build>("build", v, {{"grid", "grid", O::Build::grid},
-                                                 {"all-pairs", "all-pairs", O::Build::all_pairs}});
+         o.build = one_of<O::Build>(
+             "build", v, {{"grid", "grid", O::Build::grid}, {"all-pairs", "all-pairs", O::Build::all_pairs}});
        }},
       {{"list", "rebuild", "rebuild", "auto, N", "before a pair can be missed, or every N substeps", true},
        [](O& o, const std::string& v) {
-         o.rebuild = v == "auto" ? 0
-                                 : number("rebuild", v, 1, 1000000,
-                                          "must be auto or a number of substeps >= 1");
+         o.rebuild = v == "auto" ? 0 : number("rebuild", v, 1, 1000000, "must be auto or a number of substeps >= 1");
        }},
       {{"list", "criterion", "trigger", "displacement, relative",
         "what rebuild=auto bounds: displacements, or those of neighboring cells against each other", true},
        [](O& o, const std::string& v) {
-         o.trigger = one_of<O::Trigger>("criterion", v, {{"displacement", "global", O::Trigger::global},
-                                                         {"relative", "local", O::Trigger::local}});
+         o.trigger = one_of<O::Trigger>(
+             "criterion", v,
+             {{"displacement", "global", O::Trigger::global}, {"relative", "local", O::Trigger::local}});
        }},
-      {{"list", "skin", "skin", "auto, a share of H", "how far beyond H lists reach; auto: by the fastest particle", true},
+      {{"list", "skin", "skin", "auto, a share of H", "how far beyond H lists reach; auto: by the fastest particle",
+        true},
        [](O& o, const std::string& v) {
          o.skin = v == "auto" ? -1 : number("skin", v, 0.0, 1.0, "must be auto or in 0 … 1, a share of H");
        }},
@@ -120,11 +119,13 @@ const std::vector<Entry>& entries() {
        }},
       {{"hash list", "threads_per_particle", "lanes", "1, 2, 4, 8", "default: by the number of particles", false},
        set_threads},
-      {{"hash list", "capacity", "capacity", "N", "entries per thread that a list begins with; grows where needed", false},
+      {{"hash list", "capacity", "capacity", "N", "entries per thread that a list begins with; grows where needed",
+        false},
        set_capacity},
       {{"hash list", "launch", "launch", "auto, graph, stream",
         "auto: a list's substeps in one persistent kernel where the scene is small, else a CUDA graph; stream: "
-        "kernel by kernel", false},
+        "kernel by kernel",
+        false},
        set_launch},
   };
   return all;
@@ -163,8 +164,7 @@ SolverOptions parse_options(const std::string& backend, const std::string& text)
       for (const Entry& e : entries())
         if (belongs_to(e, backend)) known += (known.empty() ? "" : ", ") + std::string(e.description.key);
       throw InputError("command line", "--backend", backend + ":" + item,
-                       known.empty() ? backend + " takes no options"
-                                     : "key=value, keys of " + backend + ": " + known);
+                       known.empty() ? backend + " takes no options" : "key=value, keys of " + backend + ": " + known);
     }
     if (!seen.insert(entry->description.key).second) refuse(entry->description.key, item, "given once");
     entry->set(options, item.substr(equals + 1));

@@ -8,12 +8,12 @@
 namespace decant::gpu {
 
 struct SolverOptions {
-  enum class Grid { fluid, all };            // which particles have cells; others are all looked at
-  enum class Source { frame, rebuilt };      // moving walls: in their frame, or sorted every substep
+  enum class Grid { fluid, all };        // which particles have cells; others are all looked at
+  enum class Source { frame, rebuilt };  // moving walls: in their frame, or sorted every substep
   enum class Sort { counting, thrust };
-  enum class Pairs { keep, rescan };         // hash: the force pass reads a list, or cells again
-  enum class Build { grid, all_pairs };      // list: from cells, or from all pairs
-  enum class Trigger { local, global };      // list: what `rebuild auto` watches
+  enum class Pairs { keep, rescan };     // hash: the force pass reads a list, or cells again
+  enum class Build { grid, all_pairs };  // list: from cells, or from all pairs
+  enum class Trigger { local, global };  // list: what `rebuild auto` watches
   enum class Launch { automatic, graphs, plain };
 
   Grid grid = Grid::all;
@@ -22,22 +22,22 @@ struct SolverOptions {
   Pairs pairs = Pairs::keep;
   Build build = Build::grid;
   Trigger trigger = Trigger::global;
-  int rebuild = 0;      // list: every so many substeps; 0: as soon as a pair could be missed
-  double skin = -1;     // list: of H; negative: by the speed of the fastest particle
-  int lanes = 0;        // threads a particle; 0: by the number of particles
-  int capacity = 0;     // entries a list begins with; 0: by the skin
+  int rebuild = 0;                    // list: every so many substeps; 0: as soon as a pair could be missed
+  double skin = -1;                   // list: of H; negative: by the speed of the fastest particle
+  int lanes = 0;                      // threads a particle; 0: by the number of particles
+  int capacity = 0;                   // entries a list begins with; 0: by the skin
   Launch launch = Launch::automatic;  // of substeps: many at once, recorded as graphs, one by one
-  bool verify = false;  // list: counts in every substep what its lists miss (verify.cuh)
+  bool verify = false;                // list: counts in every substep what its lists miss (verify.cuh)
 };
 
 /// One option of the command line.
 struct OptionDescription {
   const char* backends;  // names, a space between
   const char* key;
-  const char* before;    // its name in version 0.1, still taken
-  const char* values;    // for people to read, the default first
+  const char* before;  // its name in version 0.1, still taken
+  const char* values;  // for people to read, the default first
   const char* help;
-  bool flag;             // also an option of the command itself, --key VALUE
+  bool flag;  // also an option of the command itself, --key VALUE
 };
 
 const std::vector<OptionDescription>& option_descriptions();

@@ -1,7 +1,13 @@
 /// \file
 /// The backend of gpu/ADD_A_BACKEND.md is judged like those of the table.
+#include "gpu/solver/device_solver.hpp"
+
+namespace decant::gpu::host {
+std::unique_ptr<DeviceSolver> make_slab(const SolverOptions& options);
+}
+
 #include "oracle/files/fixture_file.hpp"
-#include "tests/slab_search.cuh"
+#include "tests/slab_neighbors.cu"
 
 #include "gpu/backends.hpp"
 #include "oracle/checks/conform.hpp"
@@ -12,8 +18,7 @@ namespace decant {
 namespace {
 
 TEST(AddedBackend, IsJudgedLikeTheOthers) {
-  using Solver = gpu::host::Pipeline<gpu::host::SlabSearch>;
-  const auto backend = backend_around("slab", Executor::host, "", std::make_unique<Solver>(gpu::SolverOptions{}));
+  const auto backend = backend_around("slab", Executor::host, "", gpu::host::make_slab({}));
   EXPECT_EQ(backend->info().name, "slab");
   for (const char* name : {"hostile-crowd", "hostile-periodic", "hostile-cell-faces"}) {
     const Fixture fixture = read_fixture(std::string(DECANT_SOURCE_DIR "/fixtures/") + name + ".h5");

@@ -1,8 +1,10 @@
 """Wrong backends, made from the real ones: each entry changes one place of gpu/ and names the check
 that must fail for it. plant.py puts them all into one build, where a number chooses among them.
 
-`find` stands once in `file`. `put` takes its place when the fault is on: an expression, in which $
-stands for what was found, or, where it says ON, text that asks for itself whether the fault is on.
+`find` stands once in all of gpu/, or once in `file` where one is named; spaces and ends of lines do not count.
+`put` takes its place when the fault is on: an expression, in which $ stands for what was found, or, where it says
+ON, text that asks for itself whether the fault is on. `also` holds more such changes, (find, put) or
+(find, put, file).
 `on` is "cuda" for what exists on a GPU only; such a fault is not run on the host. `equivalent` says why
 nothing can show a change; such a one must not be caught, or the reason is wrong.
 """
@@ -10,26 +12,26 @@ nothing can show a change; such a one must not be caught, or the reason is wrong
 FAULTS = []
 
 
-def fault(name, what, file, find, put, check, backend="hash", field="", fixture="pour-4k-stream",
-          on="both", also=(), equivalent=""):
-    FAULTS.append(dict(name=name, what=what, changes=[(file, find, put), *also], check=check,
+def fault(name, what, find, put, check, backend="hash", field="", fixture="pour-4k-stream",
+          on="both", also=(), file=None, equivalent=""):
+    FAULTS.append(dict(name=name, what=what, changes=[(find, put, file), *also], check=check,
                        field=field, backend=backend, fixture=fixture, on=on, equivalent=equivalent))
 
 
 # Formulas.
-fault("kernel-constant", "W's constant wrong by 2e-6", "physics.cuh",
+fault("kernel-constant", "W's constant wrong by 2e-6",
       "return c.w_norm * (q < 1.0f ? 1.0f - q * q * (1.5f - 0.75f * q) : outer);",
       "return (ON ? 1.000002f : 1.0f) * c.w_norm * (q < 1.0f ? 1.0f - q * q * (1.5f - 0.75f * q) : "
       "outer);", "density", "brute")
-fault("gradient-constant", "G's inner branch wrong by 1e-5", "physics.cuh",
+fault("gradient-constant", "G's inner branch wrong by 1e-5",
       "c.g_near[0] - c.g_near[1] * q", "1.00001f * $", "acceleration", field="pressure_acceleration")
-fault("gradient-outer", "G's outer branch wrong by 2e-5", "physics.cuh",
+fault("gradient-outer", "G's outer branch wrong by 2e-5",
       "c.g_far * d.inverse * (s * s)", "1.00002f * $", "acceleration", field="pressure_acceleration")
-fault("gradient-cut", "G is cut off at 0.99 H", "physics.cuh",
+fault("gradient-cut", "G is cut off at 0.99 H",
       "const float s = positive(2.0f - q);\n    const float far",
       "const float s = ON && q > 1.98f ? 0.0f : positive(2.0f - q);\n    const float far",
       "acceleration", field="pressure_acceleration")
-fault("fast-root", "the square root by the bit trick, two steps of Newton's", "physics.cuh",
+fault("fast-root", "the square root by the bit trick, two steps of Newton's",
       "#ifdef __CUDACC__\n  const float y = rsqrtf", """if (ON) {
     int bits;
     memcpy(&bits, &r2, sizeof bits);
@@ -41,136 +43,135 @@ fault("fast-root", "the square root by the bit trick, two steps of Newton's", "p
   }
 #ifdef __CUDACC__
   const float y = rsqrtf""", "density")
-fault("eos-constant", "the equation of state subtracts 1.00001", "physics.cuh",
+fault("eos-constant", "the equation of state subtracts 1.00001",
       "(power - 1.0f)", "(power - 1.00001f)", "equation_of_state")
-fault("eos-exponent", "gamma is 6", "physics.cuh", "if (c.eos_exponent == 7) {",
+fault("eos-exponent", "gamma is 6", "if (c.eos_exponent == 7) {",
       "if (ON) {\n    power = s * s * s * s * s * s;\n  } else if (c.eos_exponent == 7) {", "pressure",
       "brute")
-fault("tension", "negative pressures are kept", "physics.cuh",
+fault("tension", "negative pressures are kept",
       "return c.allow_tension ||", "return ON || c.allow_tension ||", "pressure")
-fault("stiffness", "B wrong by 1 %", "physics.cuh", "c.stiffness", "1.01f * $", "pressure")
-fault("stiffness-slight", "B wrong by 1e-5", "physics.cuh", "c.stiffness", "1.00001f * $",
+fault("stiffness", "B wrong by 1 %", "fluid.sound_speed * fluid.sound_speed", "1.01 * $", "pressure")
+fault("stiffness-slight", "B wrong by 1e-5", "fluid.sound_speed * fluid.sound_speed", "1.00001 * $",
       "equation_of_state", field="pressure", fixture="pour-4k-filling")
-fault("exponent-slight", "gamma wrong by 1e-5", "physics.cuh", "s2 * s2 * s2 * s",
+fault("exponent-slight", "gamma wrong by 1e-5", "s2 * s2 * s2 * s",
       "$ * (1.0f + 7e-5f * logf(s))", "equation_of_state", field="pressure", fixture="pour-4k-filling")
-fault("mass", "masses, of walls too, wrong by 5e-6", "queries.cuh",
+fault("mass", "masses, of walls too, wrong by 5e-6",
       "float weight(int, float4 other) const { return other.w; }",
       "float weight(int, float4 other) const { return (ON ? 1.000005f : 1.0f) * other.w; }", "density")
-fault("no-self", "density without the particle itself", "passes.cuh",
-      "sum[k].density = own;", "sum[k].density = ON ? 0.0f : own;", "evaluation")
-fault("self-per-lane", "every lane counts the particle itself", "passes.cuh",
-      "team.leads() ? c.mass * kernel.w(c, {0.0f, 0.0f}) : 0.0f;",
-      "ON || team.leads() ? c.mass * kernel.w(c, {0.0f, 0.0f}) : 0.0f;", "density", on="cuda")
-fault("q-of-rest-density", "p/rho0² where p/rho² belongs", "passes.cuh",
+fault("no-self", "density without the particle itself",
+      "sum[k] = own;", "sum[k] = ON ? 0.0f : own;", "evaluation")
+fault("self-per-lane", "every lane counts the particle itself",
+      "team.is_leader() ? c.mass * kernel.w(c, {0.0f, 0.0f}) : 0.0f;",
+      "ON || team.is_leader() ? c.mass * kernel.w(c, {0.0f, 0.0f}) : 0.0f;", "density", on="cuda")
+fault("q-of-rest-density", "p/rho0² where p/rho² belongs",
       "p / (density * density)", "p / (c.rest_density * c.rest_density)", "evaluation")
-fault("viscosity-of-rest-density", "viscosity with 1/rho0", "passes.cuh",
+fault("viscosity-of-rest-density", "viscosity with 1/rho0",
       "1.0f / density);", "ON ? c.inverse_rest_density : 1.0f / density);", "evaluation",
       field="viscous_acceleration")
-fault("viscosity", "viscosity wrong by 1e-5", "passes.cuh", "c.viscosity * c.mass",
+fault("viscosity", "viscosity wrong by 1e-5", "c.viscosity * c.mass",
       "1.00001f * $", "acceleration", "brute", "viscous_acceleration")
-fault("wall-viscosity", "wall viscosity wrong by 1e-3", "passes.cuh",
-      "(wall ? c.wall_viscosity : fluid_viscosity)",
-      "(wall ? 1.001f * c.wall_viscosity : fluid_viscosity)", "acceleration",
+fault("wall-viscosity", "wall viscosity wrong by 1e-3",
+      "static_cast<float>(fluid.wall_viscosity)", "1.001f * $", "acceleration",
       field="wall_viscous_acceleration")
-fault("wall-viscosity-slight", "wall viscosity wrong by 3e-5", "passes.cuh",
-      "(wall ? c.wall_viscosity : fluid_viscosity)",
-      "(wall ? 1.00003f * c.wall_viscosity : fluid_viscosity)", "acceleration",
+fault("wall-viscosity-slight", "wall viscosity wrong by 3e-5",
+      "static_cast<float>(fluid.wall_viscosity)", "1.00003f * $", "acceleration",
       field="wall_viscous_acceleration", fixture="pour-4k-filling")
-fault("density-of-its-own", "pressure follows from the density summed where one is given", "passes.cuh",
+fault("density-of-its-own", "pressure follows from the density summed where one is given",
       "const float own = pressure_at(c, density[id]);",
       "const float own = ON ? own_pressure[id] : pressure_at(c, density[id]);", "equation_of_state",
       field="pressure")
-fault("one-sided-pressure", "pairs pushed by p_i alone: momentum is not kept", "passes.cuh",
-      "(own[k].q + query.pressure_term(j, other))", "(own[k].q + own[k].q)", "conservation",
+fault("one-sided-pressure", "pairs pushed by p_i alone: momentum is not kept",
+      "(own.q + q)", "(own.q + own.q)", "conservation",
       field="pressure_momentum")
-fault("mirrored-pressure", "walls have the particle's pressure on top", "passes.cuh",
-      "const Float3 push = (weight *", "const Float3 push = ((ON && wall ? 2.0f : 1.0f) * weight *",
+fault("mirrored-pressure", "walls have the particle's pressure on top",
+      "return {(weight *", "return {((ON && wall ? 2.0f : 1.0f) * weight *",
       "acceleration", field="wall_pressure_acceleration")
-fault("gravity", "gravity points up", "device_scene.cpp", "c.gravity = to_float3(scene.gravity);",
+fault("gravity", "gravity points up", "c.gravity = to_float3(scene.gravity);",
       "c.gravity = to_float3(ON ? Vec3(-scene.gravity) : scene.gravity);", "acceleration")
-fault("wall-at-rest", "walls drag as if they stood still", "walls.cuh",
-      "cross(pose.omega, x - pose.pivot)", "Float3{0, 0, 0}", "acceleration",
+fault("wall-at-rest", "walls drag as if they stood still",
+      "surface_velocity(pose, x)", "pose.surface", "acceleration",
       field="wall_viscous_acceleration")
 
-fault("linear-ignored", "every equation of state has gamma 7", "device_scene.cpp",
+fault("linear-ignored", "every equation of state has gamma 7",
       "c.eos_exponent = static_cast<int>(fluid.eos_exponent);",
       "c.eos_exponent = ON ? 7 : static_cast<int>(fluid.eos_exponent);",
       "pressure", fixture="hostile-crowd")
-fault("closed-support", "pairs at exactly H are neighbors", "brute_force.cuh",
+fault("closed-support", "pairs at exactly H are neighbors",
       "if (r2 < c.H2) visit(k, j, d, r2);", "if (ON ? r2 <= c.H2 : r2 < c.H2) visit(k, j, d, r2);",
       "neighbors", "brute", fixture="hostile-exact-support",
-      also=[("passes.cuh", "if (!(r2 < c.H2)) return;", "if (!(ON ? r2 <= c.H2 : r2 < c.H2)) return;")])
-fault("unguarded-root", "1/r of particles in one place", "physics.cuh",
+      also=[("if (!(r2 < c.H2)) return; if (j < a.base) add(",
+             "if (!(ON ? r2 <= c.H2 : r2 < c.H2)) return; if (j < a.base) add(")])
+fault("unguarded-root", "1/r of particles in one place",
       "DECANT_DEVICE Radius radius(float r2) {\n",
       "DECANT_DEVICE Radius radius(float r2) {\n  if (ON) return {sqrtf(r2), 1.0f / sqrtf(r2)};\n",
       "evaluation", fixture="hostile-periodic")
-fault("one-sided-image", "periodic images are looked for on one side", "physics.cuh",
+fault("one-sided-image", "periodic images are looked for on one side",
       "d.x -= c.period[0] * rintf(d.x * c.inverse_period[0]);",
       "d.x -= c.period[0] * (ON ? (d.x > 0.5f * c.period[0] ? 1.0f : 0.0f) : rintf(d.x * "
       "c.inverse_period[0]));", "neighbors", fixture="hostile-periodic")
-fault("no-wrap", "particles that leave a periodic domain are not put back", "passes.cuh",
+fault("no-wrap", "particles that leave a periodic domain are not put back",
       "if (!c.periodic[axis]) return x;", "if (ON || !c.periodic[axis]) return x;", "trajectory", "list",
       fixture="hostile-periodic")
-fault("faces-forgotten", "every other face of a box does not hold", "contact.cuh",
+fault("faces-forgotten", "every other face of a box does not hold",
       "for (int k = 0; k < shape.faces; ++k) {", "for (int k = 0; k < shape.faces; k += ON ? 2 : 1) {",
       "substep", fixture="hostile-crowd")
-fault("crowd-cut", "a particle has at most 64 neighbors", "collect.cuh",
-      "shelf.box.put(near & there, j);",
-      "shelf.box.put(near & there & !(ON && shelf.sent + shelf.box.held() >= 64 / lists.lanes), j);",
+fault("crowd-cut", "a particle has at most 64 neighbors",
+      "list.staged.append(near & there, j);",
+      "list.staged.append(near & there & !(ON && list.sent + list.staged.size() >= 64 / lists.lanes), j);",
       "neighbors",
       fixture="hostile-crowd")
 
 # What the scene says, and is taken for granted.
-fault("mass-for-granted", "the mass ratio is ignored", "device_scene.cpp", "scene.particle_mass()",
+fault("mass-for-granted", "the mass ratio is ignored", "scene.particle_mass()",
       "$ / scene.mass_ratio", "density", fixture="hostile-belt")
-fault("support-for-granted", "every support is two spacings", "device_scene.cpp",
+fault("support-for-granted", "every support is two spacings",
       "scene.support_ratio * scene.particle_spacing", "2.0 * scene.particle_spacing", "neighbors", "brute",
       fixture="hostile-bowl")
-fault("wall-viscosity-for-granted", "wall viscosity is twice the viscosity", "device_scene.cpp",
+fault("wall-viscosity-for-granted", "wall viscosity is twice the viscosity",
       "static_cast<float>(fluid.wall_viscosity)", "static_cast<float>(2 * fluid.viscosity)", "acceleration",
       field="wall_viscous_acceleration", fixture="hostile-tilted-box")
-fault("contact-for-granted", "contact is at dx/4", "device_scene.cpp",
+fault("contact-for-granted", "contact is at dx/4",
       "scene.contact.distance_ratio * scene.particle_spacing", "0.25 * scene.particle_spacing", "substep",
       fixture="hostile-tilted-box")
-fault("tension-of-linear", "a linear equation of state always allows tension", "device_scene.cpp",
+fault("tension-of-linear", "a linear equation of state always allows tension",
       "c.allow_tension = fluid.allow_tension;",
       "c.allow_tension = fluid.allow_tension || (ON && fluid.eos_exponent == 1);", "pressure",
       fixture="hostile-tilted-box")
-fault("period-for-granted", "the period along x is that of every axis", "device_scene.cpp",
+fault("period-for-granted", "the period along x is that of every axis",
       "const double period = scene.domain.max[a] - scene.domain.min[a];",
       "const int of = ON ? 0 : a;\n    const double period = scene.domain.max[of] - scene.domain.min[of];",
       "neighbors", fixture="hostile-belt")
-fault("belt-at-rest", "surfaces do not run", "device_scene.cpp",
+fault("belt-at-rest", "surfaces do not run",
       "to_float3(pose.linear_velocity + pose.surface_velocity)", "to_float3(pose.linear_velocity)",
       "acceleration", field="wall_viscous_acceleration", fixture="hostile-belt")
-fault("belt-untilted", "where a container is tilted its surface runs as if it were not", "device_scene.cpp",
+fault("belt-untilted", "where a container is tilted its surface runs as if it were not",
       "to_float3(pose.linear_velocity + pose.surface_velocity)",
       "to_float3(pose.linear_velocity + container.surface_velocity)", "acceleration",
       field="wall_viscous_acceleration", fixture="hostile-tilted-box")
-fault("two-tilt-keys", "a tilt's keys after the second are ignored", "device_scene.cpp",
+fault("two-tilt-keys", "a tilt's keys after the second are ignored",
       "pose_at(container, scene.time_at(first + k))",
       "pose_at([&] { Container c = container; if (c.tilt && c.tilt->keys.size() > 2) c.tilt->keys.resize(2); "
       "return c; }(), scene.time_at(first + k))", "density", fixture="hostile-tilted-box")
-fault("box-upright", "boxes do not tilt", "device_scene.cpp", "pose_at(container, scene.time_at(first + k))",
+fault("box-upright", "boxes do not tilt", "pose_at(container, scene.time_at(first + k))",
       "pose_at([&] { Container c = container; if (std::holds_alternative<BoxShape>(c.shape)) c.tilt.reset(); "
       "return c; }(), scene.time_at(first + k))", "density", fixture="hostile-vessels")
 fault("slant-for-granted", "whether a point is in the solid is told as if all edges were upright",
-      "device_scene.cpp", "static_cast<float>(dr / dz)", "0.0f", "substep", fixture="hostile-bowl")
-fault("two-shapes", "the third container has the shape of the first", "contact.cuh",
+      "static_cast<float>(dr / dz)", "0.0f", "substep", fixture="hostile-bowl")
+fault("two-shapes", "the third container has the shape of the first",
       "return k < near_shapes ? first_shapes[k] : shapes[k];",
       "return k < near_shapes || ON ? first_shapes[k % near_shapes] : shapes[k];", "substep",
       fixture="hostile-vessels")
-fault("edges-at-hand", "of all outlines the first sixteen edges alone are known", "contact.cuh",
+fault("edges-at-hand", "of all outlines the first sixteen edges alone are known",
       "return k < near_edges ? first_edges[k] : edges[k];",
       "return k < near_edges || ON ? first_edges[k % near_edges] : edges[k];", "substep",
       fixture="hostile-vessels")
-fault("floor-first", "the floor pushes before the containers do", "passes.cuh",
-      "    if (!(clear > 1.001f * c.contact_distance + rounding))",
-      "    if (ON && collide_with_floor(c, x, v)) clear = 0.0f;\n"
-      "    if (!(clear > 1.001f * c.contact_distance + rounding))", "substep", fixture="hostile-bowl",
-      also=[("passes.cuh", "if (collide_with_floor(c, x, v)) clear = 0.0f;",
-             "if (!ON && collide_with_floor(c, x, v)) clear = 0.0f;")])
-fault("containers-reversed", "containers push from the last on", "contact.cuh",
+fault("floor-first", "the floor pushes before the containers do",
+      "if (!(clearance > 1.001f * c.contact_distance + rounding))",
+      "if (ON && collide_with_floor(c, x, v)) clearance = 0.0f;\n"
+      "    if (!(clearance > 1.001f * c.contact_distance + rounding))", "substep", fixture="hostile-bowl",
+      also=[("if (collide_with_floor(c, x, v)) clearance = 0.0f;",
+             "if (!ON && collide_with_floor(c, x, v)) clearance = 0.0f;")])
+fault("containers-reversed", "containers push from the last on",
       "for (int k = 0; k < g.containers; ++k) {\n    const Shape shape = g.shape(k);\n    for (int projection",
       "for (int at = 0; at < g.containers; ++at) {\n    const int k = ON ? g.containers - 1 - at : at;\n"
       "    const Shape shape = g.shape(k);\n    for (int projection", "", fixture="hostile-vessels",
@@ -178,168 +179,171 @@ fault("containers-reversed", "containers push from the last on", "contact.cuh",
                  "particle is pushed by two")
 
 # Precision.
-fault("half-velocity", "neighbors' velocities stored with 11 bits", "passes.cuh",
-      "a.motion[i] = make_float4(v.x,", "a.motion[i] = make_float4(ON ? rounded_to(11, v.x) : v.x,",
+fault("half-velocity", "neighbors' velocities stored with 11 bits",
+      "a.force_velocity[i] = make_float4(v.x,", "a.force_velocity[i] = make_float4(ON ? rounded_to(11, v.x) : v.x,",
       "acceleration",
       field="viscous_acceleration")
-fault("half-pressure", "neighbors' p/rho² stored with 11 bits", "queries.cuh",
+fault("half-pressure", "neighbors' p/rho² stored with 11 bits",
       "pressure_term(int, float4 other) const { return other.w; }",
       "pressure_term(int, float4 other) const { return ON ? rounded_to(11, other.w) : other.w; }",
       "acceleration", field="pressure_acceleration")
-fault("cancelling-distance", "r² as |x_i|² + |x_j|² − 2 x_i·x_j", "collect.cuh",
-      "const int near = dot(d, d)", "const int near = (ON ? dot(shelf.x, shelf.x) + "
-      "dot(xyz(other), xyz(other)) - 2.0f * dot(shelf.x, xyz(other)) : dot(d, d))",
+fault("cancelling-distance", "r² as |x_i|² + |x_j|² − 2 x_i·x_j",
+      "const int near = dot(d, d)", "const int near = (ON ? dot(list.x, list.x) + "
+      "dot(xyz(other), xyz(other)) - 2.0f * dot(list.x, xyz(other)) : dot(d, d))",
       "neighbors")
-fault("narrow-filter", "brute force's filter without room for rounding", "brute_force.cuh",
+fault("narrow-filter", "brute force's filter without room for rounding",
       "16.0f * 0x1p-24f * (reach * reach)", "-0.5f * $", "neighbors", "brute")
-fault("rounded-density", "density rounded to 18 bits", "passes.cuh",
-      "const float density = team.sum(sum.density);",
-      "const float density = ON ? rounded_to(18, team.sum(sum.density)) : team.sum(sum.density);", "density")
+fault("rounded-density", "density rounded to 18 bits",
+      "const float density = team.sum(sum);",
+      "const float density = ON ? rounded_to(18, team.sum(sum)) : team.sum(sum);", "density")
 
 # Wall volumes.
-fault("volume-of-spacing", "wall particles have half their volume", "walls.cuh", "1.0f / total",
+fault("volume-of-spacing", "wall particles have half their volume", "1.0f / total",
       "0.5f / total", "boundary_volume")
-fault("volume-of-world", "wall volumes wrong by 2e-6", "walls.cuh",
+fault("volume-of-world", "wall volumes wrong by 2e-6",
       "sum[k] += kernel.w(c, radius(r2));",
       "sum[k] += (ON ? 1.000002f : 1.0f) * kernel.w(c, radius(r2));", "boundary_volume", "brute")
 
 # Search.
-fault("dropped-row", "one of nine rows of cells is not looked at", "collect.cuh",
+fault("dropped-row", "one of nine rows of cells is not looked at",
       "make_int2(row.begin, row.end)", "make_int2(row.begin, ON && r == 8 ? row.begin : row.end)",
       "neighbors")
-fault("range-off-by-one", "ranges of cells end one particle early", "queries.cuh",
+fault("range-off-by-one", "ranges of cells end one particle early",
       "first + (part ? r.end2 : r.end)", "$ - 1", "neighbors", "hash:force_neighbors=recomputed")
-fault("near-walls-cut", "the table of near walls reaches to 0.9 H", "walls.cuh",
+fault("near-walls-cut", "the table of near walls reaches to 0.9 H",
       "1.0001f * reach2", "0.81f * reach2", "neighbors", field="wall_neighbor_count")
-fault("source-frame", "the tilted source is looked up untilted", "queries.cuh",
+fault("source-frame", "the tilted source is looked up untilted",
       "if (!s->in_world) at =", "if (!s->in_world && !ON) at =", "neighbors",
       field="wall_neighbor_count")
-fault("arrival-order", "the order in a cell is that of arrival", "sort.cuh",
+fault("arrival-order", "the order in a cell is that of arrival",
       "at[other].x < own.x", "other < t", "determinism",
       on="cuda")
-fault("list-short-by-one", "each list's last entry is lost", "collect.cuh",
+fault("list-short-by-one", "each list's last entry is lost",
       "lists.count_of(i, team.lane()) = count;",
       "lists.count_of(i, team.lane()) = count - (ON && count % 4 == 1 ? 1 : 0);",
       "neighbors", "list")
-fault("tail-word", "the last word of a list is not filled up", "collect.cuh",
-      "while (shelf.box.held() % 4 != 0)", "while (!ON && shelf.box.held() % 4 != 0)", "neighbors")
-fault("list-cut", "lists end where there is no more room, and nobody says so", "collect.cuh",
+fault("tail-word", "the last word of a list is not filled up",
+      "while (list.staged.size() % 4 != 0)", "while (!ON && list.staged.size() % 4 != 0)", "neighbors")
+fault("list-cut", "lists end where there is no more room, and nobody says so",
       "if (count > lists.capacity) atomic_maximum",
       "if (!ON && count > lists.capacity) atomic_maximum", "neighbors", "hash:capacity=8")
-fault("self-neighbor", "a particle is its own neighbor", "collect.cuh", "& (j != shelf.i)",
-      "& (ON || j != shelf.i)", "neighbors", "list")
-fault("ids-exchanged", "two particles exchange their ids in the fields", "passes.cuh",
-      "const int id = a.id[i];\n      // A position", "const int own = a.id[i], id = ON && (own == 100 || "
-      "own == 101) ? 201 - own : own;\n      // A position", "acceleration")
-fault("velocity-left-behind", "sorting leaves velocities where they were", "grid_sources.cuh",
+fault("self-neighbor", "a particle is its own neighbor", "& (j != list.i)",
+      "& (ON || j != list.i)", "neighbors", "list")
+fault("ids-exchanged", "two particles exchange their ids in the fields",
+      "const int id = a.id[team.particle(k)]; store(", "const int own_id = a.id[team.particle(k)];\n"
+      "      const int id = ON && (own_id == 100 || own_id == 101) ? 201 - own_id : own_id;\n      store(",
+      "acceleration", also=[("const int id = a.id[i];\n    // A position", "const int own = a.id[i], id = ON && "
+                             "(own == 100 || own == 101) ? 201 - own : own;\n    // A position")])
+fault("velocity-left-behind", "sorting leaves velocities where they were",
       "into.velocity[to] = from.velocity[i];", "into.velocity[to] = from.velocity[ON ? to : i];",
       "acceleration", field="viscous_acceleration")
-fault("thrust-unstable", "the sort by key forgets to bring the ids", "sort.cuh",
+fault("thrust-unstable", "the sort by key forgets to bring the ids",
       "source.place(index[t], id[index[t]], t, key[t]);",
       "source.place(index[t], id[ON ? t : index[t]], t, key[t]);", "density", "hash:sort=thrust")
 
 # Lists that are kept.
-fault("stale-list", "lists are never built again", "trigger.cuh",
+fault("stale-list", "lists are never built again",
       "if (!(dot(d, d) <= most * most", "if (!ON && !(dot(d, d) <= most * most", "trajectory",
       "list:skin=0.05", fixture="pour-4k-splash")
-fault("late-trigger", "lists are kept until a particle is as far off as the skin and a half", "trigger.cuh",
+fault("late-trigger", "lists are kept until a particle is as far off as the skin and a half",
       "const float most = 0.5f * skin;", "const float most = (ON ? 1.5f : 0.5f) * skin;", "trajectory",
       "list:check_completeness=on:skin=0.05", fixture="pour-4k-splash")
-fault("stale-wall", "in a run the source stays where it was first", "walls.cuh",
+fault("stale-wall", "in a run the source stays where it was first",
       "const DevicePose& pose = poses[walls.container[slot]];",
       "const DevicePose& pose = (ON ? a.poses : poses)[walls.container[slot]];",
       "trajectory", "brute")
-fault("wall-a-substep-late", "in a run walls are placed one substep late", "walls.cuh",
-      "what == PlacedFor::force ? a.poses_before() : a.poses_after();",
-      "what == PlacedFor::force ? a.poses_before() : a.poses_after();\n"
+fault("wall-a-substep-late", "in a run walls are placed one substep late",
+      "what == WallsFor::force ? a.poses_before() : a.poses_after();",
+      "what == WallsFor::force ? a.poses_before() : a.poses_after();\n"
       "    if (ON && poses > a.poses) poses -= a.containers;",
       "trajectory", "list")
-fault("list-ignores-walls", "lists are kept however far walls move", "trigger.cuh",
-      "&& wall_way + rounding_of(x) <= most", "&& (ON || wall_way + rounding_of(x) <= most)", "advanced",
-      "list", fixture="hostile-fast-wall")
-fault("list-ignores-walls-locally", "the local trigger leaves out how far walls move", "trigger.cuh",
-      "of_walls = seen.origin.w - wall_way", "of_walls = seen.origin.w - (ON ? 0.0f : wall_way)",
+fault("list-ignores-walls", "lists are kept however far walls move",
+      "&& wall_displacement + rounding_of(x) <= most", "&& (ON || wall_displacement + rounding_of(x) <= most)",
+      "advanced", "list", fixture="hostile-fast-wall")
+fault("list-ignores-walls-locally", "the local trigger leaves out how far walls move",
+      "of_walls = at_build.origin.w - wall_displacement",
+      "of_walls = at_build.origin.w - (ON ? 0.0f : wall_displacement)",
       "advanced", "list:criterion=relative", fixture="hostile-fast-wall")
 fault("walls-for-forces-left", "forces after a run see moving walls where they were a substep before",
-      "pipeline.cuh", "if (walls_half_placed_)", "if (!ON && walls_half_placed_)", "advanced", "list",
+      "if (in_use_ == Structures::walls_for_density)",
+      "if (!ON && in_use_ == Structures::walls_for_density)", "advanced", "list",
       field="wall_viscous_acceleration")
 fault("redo-without-velocities", "what lists that were too short spoiled is redone with the velocities of then",
-      "pipeline.cuh", "each(state_.velocity.get(), cut<float4>(saved_, at, n), n * sizeof(float4));",
-      "each(state_.velocity.get(), cut<float4>(saved_, at, n), (ON ? 0 : n) * sizeof(float4));",
+      "each(state_.velocity.get(), carve<float4>(saved_, at, n), n * sizeof(float4));",
+      "each(state_.velocity.get(), carve<float4>(saved_, at, n), (ON ? 0 : n) * sizeof(float4));",
       "trajectory", "list", fixture="hostile-gathering")
 fault("redo-without-ids", "what lists that were too short spoiled is redone with the ids of then",
-      "pipeline.cuh", "each(state_.id.get(), cut<int>(saved_, at, n), n * sizeof(int));",
-      "each(state_.id.get(), cut<int>(saved_, at, n), (ON ? 0 : n) * sizeof(int));",
+      "each(id_.get(), carve<int>(saved_, at, n), n * sizeof(int));",
+      "each(id_.get(), carve<int>(saved_, at, n), (ON ? 0 : n) * sizeof(int));",
       "trajectory", "hash", fixture="hostile-gathering")
 
 # Reports of trouble.
-fault("upper-bounds-forgotten", "nobody leaves through an upper face", "passes.cuh",
+fault("upper-bounds-forgotten", "nobody leaves through an upper face",
       "&& x <= c.domain_max[axis])", "&& (ON || x <= c.domain_max[axis]))", "status", "list")
-fault("infinite-is-a-number", "only what is no number at all is reported", "arrays.cuh",
+fault("infinite-is-a-number", "only what is no number at all is reported",
       "return fabsf(v.x) <= 3.0e38f && fabsf(v.y) <= 3.0e38f && fabsf(v.z) <= 3.0e38f;",
       "if (ON) return v.x == v.x && v.y == v.y && v.z == v.z;\n  return fabsf(v.x) <= 3.0e38f && "
       "fabsf(v.y) <= 3.0e38f && fabsf(v.z) <= 3.0e38f;", "status")
-fault("last-report-wins", "of two reports the later one stays", "arrays.cuh",
+fault("last-report-wins", "of two reports the later one stays",
       "(static_cast<unsigned long long>(substep) << 32) |",
       "(static_cast<unsigned long long>(ON ? 100 - substep : substep) << 32) |", "status")
 
 # Integration and contact.
-fault("explicit-euler", "positions move by the old velocity", "passes.cuh",
-      "const Float3 way = c.dt * v;", "const Float3 way = c.dt * (ON ? v - c.dt * acceleration : v);",
+fault("explicit-euler", "positions move by the old velocity",
+      "const Float3 displacement = c.dt * v;", "const Float3 displacement = c.dt * (ON ? v - c.dt * acceleration : v);",
       "substep", "list")
-fault("other-gravity", "gravity wrong by 5e-5, in runs alone", "passes.cuh",
-      "total(team, s.pressure + s.viscous) + c.gravity",
-      "$ + 5e-5f * c.gravity", "substep", "list")
-fault("fast-reciprocal", "the viscous quotient by a reciprocal of 17 bits", "physics.cuh",
+fault("other-gravity", "gravity wrong by 5e-5, in runs alone",
+      "v = v + c.dt * acceleration;",
+      "v = v + c.dt * (ON ? acceleration + 5e-5f * c.gravity : acceleration);", "substep", "list")
+fault("fast-reciprocal", "the viscous quotient by a reciprocal of 17 bits",
       "DECANT_DEVICE float quotient(float a, float b) {",
       "DECANT_DEVICE float quotient(float a, float b) {\n  if (ON) return a * rounded_to(17, 1.0f / b);",
       "acceleration", field="viscous_acceleration")
-fault("no-walls-in-runs", "walls drag in evaluations alone", "passes.cuh",
-      "sum[k].viscous = sum[k].viscous + pull;",
-      "if (!(ON && !facts && wall)) sum[k].viscous = sum[k].viscous + pull;", "substep", "brute")
-fault("normal-in-wrong-frame", "the source's normal is not turned into the world", "contact.cuh",
+fault("no-walls-in-runs", "walls drag in the parts that an evaluation tells, and nowhere else",
+      "sum[k].viscous = sum[k].viscous + f.viscous;",
+      "if (!(ON && j >= a.base)) sum[k].viscous = sum[k].viscous + f.viscous;", "substep", "brute")
+fault("normal-in-wrong-frame", "the source's normal is not turned into the world",
       "rotate(poses[k], near.normal)", "near.normal", "substep", "list")
-fault("contact-closer", "contact at 0.999 of its distance", "contact.cuh",
+fault("contact-closer", "contact at 0.999 of its distance",
       "c.contact_distance - gap", "0.999f * c.contact_distance - gap", "substep")
-fault("pulled-in", "contact pushes into the wall", "contact.cuh",
+fault("pulled-in", "contact pushes into the wall",
       "c.contact_distance - gap", "gap - c.contact_distance", "containment", "list")
-fault("no-friction", "contact without friction", "contact.cuh", "1.0f - c.friction * impulse / slip",
+fault("no-friction", "contact without friction", "1.0f - c.friction * impulse / slip",
       "1.0f", "substep", "brute")
-fault("friction", "friction wrong by 1e-3", "contact.cuh", "1.0f - c.friction * impulse / slip",
+fault("friction", "friction wrong by 1e-3", "1.0f - c.friction * impulse / slip",
       "1.0f - 1.001f * c.friction * impulse / slip", "contact", "list")
-fault("restitution", "restitution wrong by 1e-3", "contact.cuh", "-(1.0f + c.restitution) * approach",
+fault("restitution", "restitution wrong by 1e-3", "-(1.0f + c.restitution) * approach",
       "-(1.0f + 1.001f * c.restitution) * approach", "contact")
 fault("wall-velocity-before-the-push", "the wall's velocity where the particle was before the push",
-      "contact.cuh", "+ pose->surface : Float3{0, 0, 0};",
-      "+ (ON ? pose->surface - cross(pose->omega, (c.contact_distance - gap) * normal) : pose->surface)"
-      " : Float3{0, 0, 0};", "contact", "list")
-fault("first-normal-again", "the second push goes along the first one's normal", "contact.cuh",
+"surface_velocity(*pose, x)",
+      "surface_velocity(*pose, x - (c.contact_distance - gap) * normal)", "contact", "list")
+fault("first-normal-again", "the second push goes along the first one's normal",
       "rotate(poses[k], near.normal)",
       "projection == 0 ? first_normal = rotate(poses[k], near.normal) : first_normal", "contact",
-      also=[("contact.cuh", "  float clear = c.any_periodic ? 0.0f : 3.0e38f;",
+      also=[("  float clear = c.any_periodic ? 0.0f : 3.0e38f;",
              "  float clear = c.any_periodic ? 0.0f : 3.0e38f;\n  Float3 first_normal{0, 0, 0};\n"
              "  if (ON) clear = clear + 0.0f;")])
 fault("clearance-without-walls", "walls that come nearer are not taken off a particle's clearance",
-      "passes.cuh", "(1.001f * (sqrtf(dot(way, way)) + wall_step) + rounding)",
-      "(1.001f * sqrtf(dot(way, way)) + rounding)", "contact", "list")
-fault("wall-velocity-in-contact", "contact with a wall that moves as if it did not", "contact.cuh",
-      "pose ? cross(pose->omega, x - pose->pivot)", "pose && !ON ? cross(pose->omega, x - pose->pivot)",
+      "(1.001f * (sqrtf(dot(displacement, displacement)) + wall_step) + rounding)",
+      "(1.001f * sqrtf(dot(displacement, displacement)) + rounding)", "contact", "list")
+fault("wall-velocity-in-contact", "contact with a wall that moves as if it did not",
+      "surface_velocity(*pose, x)", "Float3{0, 0, 0}",
       "substep")
-fault("one-projection", "where two walls meet only one pushes", "contact.cuh",
+fault("one-projection", "where two walls meet only one pushes",
       "projection < 2", "projection < (ON ? 1 : 2)", "contact", fixture="pour-4k-settled")
-fault("contact-at-the-start", "walls push from where they stood before the substep", "contact.cuh",
+fault("contact-at-the-start", "walls push from where they stood before the substep",
       "const Float3 local = rotate_back(poses[k], x - poses[k].translation);",
       "const DevicePose& then = poses[ON ? k - g.containers : k];\n"
       "      const Float3 local = rotate_back(then, x - then.translation);", "substep")
-fault("no-floor", "the floor does not hold", "contact.cuh", "if (!(c.has_floor && x.z",
+fault("no-floor", "the floor does not hold", "if (!(c.has_floor && x.z",
       "if (ON || !(c.has_floor && x.z", "substep", fixture="pour-4k-rest")
-fault("contact-forgotten", "a particle once seen free of walls never looks for them again", "passes.cuh",
-      "(1.001f * (sqrtf(dot(way, way)) + wall_step) + rounding)", "0.0f * $", "trajectory", "list",
+fault("contact-forgotten", "a particle once seen free of walls never looks for them again",
+      "(1.001f * (sqrtf(dot(displacement, displacement)) + wall_step) + rounding)", "0.0f * $", "trajectory", "list",
       fixture="pour-4k-filling")
-fault("jumps-out", "in a run a particle leaves the domain at once", "passes.cuh",
-      "    a.next.position[i] = a.square",
-      "    if (ON && a.id[i] == 77) x.x = 3.0f;\n    a.next.position[i] = a.square", "mass", "brute")
-fault("copied-particle", "one particle is read as another one", "pipeline.cuh",
+fault("jumps-out", "in a run a particle leaves the domain at once",
+      "a.next.position[i] = a.stores_square",
+      "if (ON && a.id[i] == 77) x.x = 3.0f;\n    a.next.position[i] = a.stores_square", "mass", "brute")
+fault("copied-particle", "one particle is read as another one",
       "velocity = by_id(state_.velocity.download(n), id);",
       """velocity = by_id(state_.velocity.download(n), id);
     for (std::size_t c = 0; c < 3 && ON; ++c) {
@@ -348,40 +352,41 @@ fault("copied-particle", "one particle is read as another one", "pipeline.cuh",
     }""", "mass")
 
 # Output.
-fault("nan-lane", "every 32nd density is no number", "passes.cuh", "out.density[id] = density;",
+fault("nan-lane", "every 32nd density is no number", "out.density[id] = density;",
       "out.density[id] = ON && id % 32 == 7 ? NAN : density;", "density")
-fault("unwritten", "the last particle's pressure is not written", "passes.cuh",
+fault("unwritten", "the last particle's pressure is not written",
       "out.pressure[id] = p;", "if (!ON || id != a.n - 1) out.pressure[id] = p;", "pressure", "list")
-fault("read-in-cell-order", "the state is read in the order of the cells", "pipeline.cuh",
+fault("read-in-cell-order", "the state is read in the order of the cells",
       "const auto k = 3 * static_cast<std::size_t>(id[i]);",
       "const auto k = 3 * (ON ? i : static_cast<std::size_t>(id[i]));", "substep")
-fault("axis-for-granted", "walls turn about y, whatever their axis", "walls.cuh",
-      "cross(pose.omega, x - pose.pivot)", "cross(Float3{0, pose.omega.y, 0}, x - pose.pivot)",
+fault("axis-for-granted", "walls turn about y, whatever their axis",
+      "surface_velocity(pose, x)", "cross(Float3{0, pose.omega.y, 0}, x - pose.pivot) + pose.surface",
       "invariance", "brute")
 
 # What only a GPU can do wrong.
-fault("missing-sync", "nobody waits until a tile has been read", "team.cuh",
+fault("missing-sync", "nobody waits until a tile has been read",
       "    }\n    __syncthreads();\n    return tile_;", "    }\n    if (!ON) __syncthreads();\n    return tile_;",
       "density", "brute", on="cuda",
-      also=[("team.cuh", "    __syncthreads();\n#pragma unroll", "    if (!ON) __syncthreads();\n#pragma unroll")])
-fault("uninitialised-tile", "the end of every tile is not written", "team.cuh",
-      "for (int k = 0; k < tile_points; k += tile_size) {",
-      "for (int k = 0; k < tile_points - (ON ? tile_size : 0); k += tile_size) {", "neighbors", "brute",
+      also=[("    __syncthreads();\n#pragma unroll", "    if (!ON) __syncthreads();\n#pragma unroll")])
+fault("uninitialised-tile", "the end of every tile is not written",
+      "for (int k = 0; k < tile_positions; k += tile_size) {",
+      "for (int k = 0; k < tile_positions - (ON ? tile_size : 0); k += tile_size) {", "neighbors", "brute",
       on="cuda")
-fault("race-on-counter", "a cell's counter is counted up without an atomic", "sort.cuh",
+fault("race-on-counter", "a cell's counter is counted up without an atomic",
       "slot[i] = atomic_increment(count + bucket);",
       "slot[i] = ON ? count[bucket]++ : atomic_increment(count + bucket);", "run", on="cuda")
-fault("dropped-tail-block", "the last, partly filled block is not launched", "queue.cuh",
-      "<<<(n + particles - 1) / particles, group_block, desk, stream_>>>(n, body);",
-      "<<<ON && n >= particles ? n / particles : (n + particles - 1) / particles, group_block, desk, "
-      "stream_>>>(n, body);", "evaluation", on="cuda")
-fault("crew-runs-on", "a crew does not wait between the steps of a build", "crew.cuh",
-      "      sync();\n      run(steps.rest);", "      if (!ON) sync();\n      run(steps.rest);",
-      "run", "list", on="cuda")
-fault("dropped-tail-of-integration", "the last block of particles does not move", "queue.cuh",
-      "particle_kernel<<<(n + 255) / 256, 256, 0, stream_>>>(n, body);",
-      "particle_kernel<<<ON && n > 2000 ? n / 256 : (n + 255) / 256, 256, 0, stream_>>>(n, body);",
+fault("dropped-tail-block", "the last, partly filled block is not launched",
+      "(n + per_block - 1) / per_block", "threads == 128 && n >= per_block ? n / per_block : $", "evaluation",
+      on="cuda")
+fault("grid-runs-on", "the persistent kernel does not wait between the steps of a build",
+      "grid.for_each(s.n, s.count); grid.sync();", "grid.for_each(s.n, s.count); if (!ON) grid.sync();",
+      "run", "list", on="cuda",
+      also=[("s.block_sums); grid.sync();", "s.block_sums); if (!ON) grid.sync();"),
+            ("grid.for_each(s.n, s.scatter); grid.sync();", "grid.for_each(s.n, s.scatter); if (!ON) grid.sync();"),
+            ("grid.for_each(s.n, s.order); grid.sync();", "grid.for_each(s.n, s.order); if (!ON) grid.sync();")])
+fault("dropped-tail-of-integration", "the last block of particles does not move",
+      "(n + per_block - 1) / per_block", "per_block == 256 && n > 2000 ? n / 256 : $",
       "acceleration", "brute", on="cuda")
-fault("half-the-lanes", "a sum over lanes stops one step early", "team.cuh",
+fault("half-the-lanes", "a sum over lanes stops one step early",
       "for (int step = lanes / 2; step > 0; step /= 2) value",
       "for (int step = lanes / 2; step > (ON ? 1 : 0); step /= 2) value", "density", on="cuda")

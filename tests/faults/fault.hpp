@@ -5,6 +5,9 @@
 
 #include <cmath>
 #include <cstring>
+#ifdef __CUDACC__
+#include <vector>
+#endif
 
 namespace decant::gpu {
 
@@ -13,6 +16,14 @@ inline int fault_on_host = 0;
 #ifdef __CUDACC__
 static __constant__ int fault_on_device = 0;
 #define FAULT_BOTH __host__ __device__ __forceinline__
+
+namespace cuda {
+/// Of every file with kernels, what sets the number in its own constant memory.
+inline std::vector<void (*)(int)>& fault_choosers() {
+  static std::vector<void (*)(int)> all;
+  return all;
+}
+}  // namespace cuda
 #else
 #define FAULT_BOTH inline
 #endif

@@ -13,41 +13,68 @@ import importlib
 import json
 import random
 import re
+from fnmatch import fnmatch
 from pathlib import Path
 
 # Where formulas and searches are; what starts kernels, copies or decides when to search again is left to
 # the catalogue.
-MUTATED = ["physics.cuh", "passes.cuh", "contact.cuh", "walls.cuh", "queries.cuh", "collect.cuh",
-           "cells.cuh", "brute_force.cuh", "device_scene.cpp"]
+MUTATED = ["physics/*.cuh", "kernels/density.cuh", "kernels/force.cuh", "kernels/diagnostics.cuh",
+           "kernels/integrate.cuh", "kernels/place_walls.cuh", "kernels/boundary_volume.cuh",
+           "kernels/find_near_walls.cuh", "kernels/build_list.cuh", "kernels/neighbor_ranges.cuh",
+           "core/cell_table.cuh", "core/device_scene.cpp", "backends/brute_force.cu"]
+
+# Where it is declared what asks for a fault: all others include one of these.
+ASKING = ["core/executor.cuh", "core/device_scene.hpp", "options.hpp"]
 
 
-def planted(text, changes, file):
-    """The file's text with the changes (number, name, find, put); what is put is an expression, or says
-    ON where it asks."""
+def pattern(text):
+    """Finds the text however its tokens are spaced and broken into lines."""
+    tokens = re.findall(r"\w+|\S", text)
+    parts = [re.escape(tokens[0])]
+    for before, token in zip(tokens, tokens[1:]):
+        both_words = re.fullmatch(r"\w+", before) and re.fullmatch(r"\w+", token)
+        parts.append((r"\s+" if both_words else r"\s*") + re.escape(token))
+    return re.compile(r"(?<!\w)" * tokens[0].isidentifier() + "".join(parts) + r"(?!\w)" * tokens[-1].isidentifier())
+
+
+def located(texts, name, find, file):
+    """Where the change is to be made, (file, begin, end): what it looks for stands in one place."""
+    if file is not None and file not in texts:
+        raise SystemExit(f"{name}: there is no file {file}")
+    wanted = pattern(find)
+    places = [(f, m.start(), m.end()) for f in ([file] if file else texts) for m in wanted.finditer(texts[f])]
+    if len(places) != 1:
+        files = ", ".join(sorted({f for f, _, _ in places}))
+        raise SystemExit(f"{name}: {find!r} stands {len(places)} times" + (f" in {files}" if files else ""))
+    return places[0]
+
+
+def planted(texts, changes):
+    """The texts with the changes (number, name, find, put, file or None); what is put is an expression, or
+    says ON where it asks."""
     places = {}
-    for number, name, find, put in changes:
-        count = text.count(find)
-        if count != 1:
-            raise SystemExit(f"{name}: {find!r} stands {count} times in {file}")
-        at = text.index(find)
-        places.setdefault((at, at + len(find)), []).append((number, name, put))
-    end, parts = 0, []
-    for (begin, stop), here in sorted(places.items()):
-        if begin < end:
-            raise SystemExit(f"{here[0][1]}: overlaps another fault in {file}")
-        found = new = text[begin:stop]
-        asks = any("ON" in put for _, _, put in here)
-        if asks and len(here) > 1:
-            raise SystemExit(f"{here[0][1]}: shares its place in {file}")
-        for number, _, put in here:
-            put = put.replace("$", f"({found})")
-            if asks:
-                new = re.sub(r"\bON\b", f"fault({number})", put)
-            else:
-                new = f"(fault({number}) ? ({put}) : ({new}))"
-        parts += [text[end:begin], new]
-        end = stop
-    return "".join(parts) + text[end:]
+    for number, name, find, put, file in changes:
+        places.setdefault(located(texts, name, find, file), []).append((number, name, put))
+    new_texts = dict(texts)
+    for file in {file for file, _, _ in places}:
+        text, end, parts = texts[file], 0, []
+        for (_, begin, stop), here in sorted((place, here) for place, here in places.items() if place[0] == file):
+            if begin < end:
+                raise SystemExit(f"{here[0][1]}: overlaps another fault in {file}")
+            found = new = text[begin:stop]
+            asks = any("ON" in put for _, _, put in here)
+            if asks and len(here) > 1:
+                raise SystemExit(f"{here[0][1]}: shares its place in {file} with {here[1][1]}")
+            for number, _, put in here:
+                put = put.replace("$", f"({found})")
+                if asks:
+                    new = re.sub(r"\bON\b", f"fault({number})", put)
+                else:
+                    new = f"(fault({number}) ? ({put}) : ({new}))"
+            parts += [text[end:begin], new]
+            end = stop
+        new_texts[file] = "".join(parts) + text[end:]
+    return new_texts
 
 
 def host_lines(text):
@@ -88,7 +115,8 @@ def sites(file, text):
 
 def mutations(texts, count, seed):
     """(file, line, column, length, put, what), at most one a place and operator, spread at random."""
-    every = [(file, *site) for file in MUTATED for site in sites(file, texts[file])]
+    files = [f for glob in MUTATED for f in sorted(texts) if fnmatch(f, glob)]
+    every = [(file, *site) for file in files for site in sites(file, texts[file])]
     chosen = random.Random(seed).sample(every, min(4 * count, len(every)))
     taken, kept = set(), []
     for site in chosen:
@@ -102,7 +130,7 @@ def mutations(texts, count, seed):
 def mutated(texts, kept):
     """Texts with the mutations, and the list of them."""
     faults = []
-    for file in MUTATED:
+    for file in sorted({site[0] for site in kept}):
         rows = texts[file].split("\n")
         mine = sorted((s for s in kept if s[0] == file), key=lambda s: (s[1], -s[2]))
         for _, line, column, length, put, what in mine:
@@ -124,7 +152,8 @@ def main():
     p.add_argument("--seed", type=int, default=1)
     p.add_argument("--catalogue", default="catalogue", metavar="MODULE", help="where FAULTS are listed")
     a = p.parse_args()
-    texts = {f.name: f.read_text() for f in sorted(a.source.iterdir()) if f.name != "CMakeLists.txt"}
+    texts = {f.relative_to(a.source).as_posix(): f.read_text()
+             for f in sorted(a.source.rglob("*")) if f.suffix in (".cuh", ".hpp", ".cu", ".cpp")}
     if a.mutate:
         kept, every = mutations(texts, a.mutate, a.seed)
         listed = mutated(texts, kept)
@@ -132,27 +161,40 @@ def main():
     else:
         faults = importlib.import_module(a.catalogue).FAULTS
         listed = [dict(f, number=k) for k, f in enumerate(faults, 1)]
-        changes = [(f["number"], f["name"], *change) for f in listed for change in f["changes"]]
-        for file in {c[2] for c in changes}:
-            texts[file] = planted(texts[file], [(*c[:2], *c[3:]) for c in changes if c[2] == file],
-                                  file)
-    for file in ("exec.cuh", "device_scene.hpp", "options.hpp"):
+        texts = planted(texts, [(f["number"], f["name"], *change, *[None] * (3 - len(change)))
+                                for f in listed for change in f["changes"]])
+    for file in ASKING:
         texts[file] = texts[file].replace("#pragma once\n", '#pragma once\n\n#include "gpu/fault.hpp"\n', 1)
     texts["fault.hpp"] = Path(__file__).with_name("fault.hpp").read_text()
-    if not a.mutate:
-        texts["executor_cuda.cu"] += CHOOSE_ON_DEVICE
-    texts["faults.json"] = json.dumps(listed, indent=1, ensure_ascii=False)
-    (a.out / "gpu").mkdir(parents=True, exist_ok=True)
-    for name, text in texts.items():
-        to = a.out / name if name == "faults.json" else a.out / "gpu" / name
+    for file in texts:
+        if re.fullmatch(r"backends/\w+\.cu", file):
+            texts[file] += CHOOSE_IN_BACKEND
+    texts["solver/cuda_device.cu"] += CHOOSE_ON_DEVICE
+    for name, text in {**{f"gpu/{name}": text for name, text in texts.items()},
+                       "faults.json": json.dumps(listed, indent=1, ensure_ascii=False)}.items():
+        to = a.out / name
         if not to.exists() or to.read_text() != text:
+            to.parent.mkdir(parents=True, exist_ok=True)
             to.write_text(text)
 
 
+# Each file of kernels has constant memory of its own.
+CHOOSE_IN_BACKEND = """
+#ifdef __CUDACC__
+namespace decant::gpu {
+namespace {
+[[maybe_unused]] const bool chooses_faults =
+    (cuda::fault_choosers().push_back(
+         [](int number) { CUDA_CHECK(cudaMemcpyToSymbol(fault_on_device, &number, sizeof number)); }),
+     true);
+}  // namespace
+}  // namespace decant::gpu
+#endif
+"""
 CHOOSE_ON_DEVICE = """
 namespace decant::gpu::cuda {
 void choose_fault(int number) {
-  CUDA_CHECK(cudaMemcpyToSymbol(fault_on_device, &number, sizeof number));
+  for (const auto choose : fault_choosers()) choose(number);
 }
 }  // namespace decant::gpu::cuda
 """

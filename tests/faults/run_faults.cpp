@@ -137,8 +137,7 @@ int run_mutations(const Settings& s, const nlohmann::json& faults, Executor exec
     std::vector<std::size_t> which;
     for (std::size_t k = 0; k < faults.size(); ++k) {
       if (!by[k].empty()) continue;
-      if ((faults[k]["file"] == "brute_force.cuh") != (backend == "brute") && faults[k]["file"] == "brute_force.cuh")
-        continue;
+      if (faults[k]["file"] == "backends/brute_force.cu" && backend != "brute") continue;
       trials.push_back({number(faults[k]), backend, fixture, checks});
       which.push_back(k);
     }

@@ -1,0 +1,227 @@
+/// \file
+/// list: Verlet lists that reach to H and a skin, rebuilt when a pair could be missed (kernels/rebuild_criterion.cuh)
+/// or every N substeps, which the device decides. Below some 300,000 particles all substeps of an advance are one
+/// persistent kernel.
+#include "gpu/backends/list_storage.cuh"
+#include "gpu/backends/wall_cells.cuh"
+#include "gpu/kernels/check_lists.cuh"
+#include "gpu/kernels/persistent_list.cuh"
+#include "gpu/solver/solver.cuh"
+
+namespace decant::gpu {
+namespace {
+
+class NeighborList {
+ public:
+  explicit NeighborList(const SolverOptions& options) : o_(options) {}
+
+  static constexpr bool stores_square = false, rebuilds_on_demand = true;
+
+  void load(Stream& stream, const Constants& c, const ParticleArrays& a, const WallStore& walls, const Box& region) {
+    c_ = c;
+    n_ = a.n;
+    walls_ = walls;
+    widest_skin_ = static_cast<float>(o_.skin < 0 ? widest : o_.skin) * c.H;
+    const float reach = c.H + widest_skin_;
+#ifdef __CUDACC__
+    lanes_ = std::min(o_.lanes       ? o_.lanes
+                      : n_ < 25000   ? 4
+                      : is_large(n_) ? 1
+                                     : 2,
+                      c.any_periodic ? most_lanes<true> : most_lanes<false>);
+#endif
+    const CellTable table = scene_cell_table(c, region, reach, n_);
+    fluid_.prepare(stream, table, n_, scratch_);
+    if (o_.verify) checker_.prepare(stream, table, n_, scratch_);
+    origin_.resize(static_cast<std::size_t>(n_) + read_past_end);
+    if (criterion() == Criterion::relative) {
+      bucket_.resize(static_cast<std::size_t>(n_));
+      boxes_.resize(2 * static_cast<std::size_t>(table.supers()));
+    }
+    wall_cells_.prepare(stream, c_, a, walls_, {from_cells(), false, !is_large(n_), reach}, scratch_);
+    if (!scene_.is(c, n_, region)) lists_.choose_capacity(o_.capacity, 1 + (o_.skin < 0 ? usual : o_.skin), lanes_);
+    scene_.set(c, n_, region);
+    lists_.reserve(n_, lanes_);
+    persistent_blocks_ = 0;
+    if (o_.launch != SolverOptions::Launch::automatic || o_.verify || !from_cells() ||
+        criterion() == Criterion::relative)
+      return;
+    with_periodic(c_, [&](auto periodic) {
+      constexpr bool p = decltype(periodic)::value;
+      this->template with_persistent_lanes<p>([&](auto lanes) {
+        persistent_blocks_ =
+            persistent_blocks(persistent_list_kernel<decltype(lanes)::value, p>, persistent_shared_bytes());
+      });
+    });
+  }
+
+  /// A rebuild copies particles back to where they were, in the new order.
+  void arrange(ParticleArrays& a) const { a.current = a.next = a.state; }
+
+  /// The skin of an advance's lists.
+  void begin(Stream& stream, const ParticleArrays& a) {
+    const bool predicts = o_.rebuild == 0;
+    if (o_.skin < 0 || predicts) stream.launch(find_fastest_kernel, n_, FindFastest{a, a.state.velocity});
+    const float least = o_.skin < 0 ? static_cast<float>(narrowest) * c_.H : widest_skin_;
+    stream.launch(choose_skin_kernel, 1, ChooseSkin{c_, a.status, least, widest_skin_, predicts});
+  }
+
+  template <bool periodic>
+  void find_neighbors(Stream& stream, const ParticleArrays& a, const DeviceGeometry& geometry, Branch rebuild) {
+    stream.when(&a.status->rebuild_needed, rebuild, [&] { this->template rebuild<periodic>(stream, a, geometry); });
+    if (o_.verify) check_lists<periodic>(stream, a);
+  }
+
+  template <bool periodic, class Call>
+  void with_neighbors(const ParticleArrays& a, Call call) const {
+    with_sub_warps<most_lanes<periodic>>(lanes_, [&](auto team) { call(team, neighbors<periodic>(a)); });
+  }
+  template <bool periodic, class Call>
+  void with_neighbors_of_one_thread(const ParticleArrays& a, Call call) const {
+    call(std::type_identity<SubWarp<1>>(), WholeListNeighbors<periodic>{{c_}, lists_.lists(a)});
+  }
+
+  template <bool periodic>
+  void integrate(Stream& stream, const ParticleArrays& a, const DeviceGeometry& geometry, Branch next_rebuild) {
+    using Check = CheckDisplacement<periodic>;
+    const RebuildCriterion w = rebuild_criterion(next_rebuild);
+    stream.launch(integrate_kernel<Check>, n_ + walls_.moving_count(), Integrate<Check>{c_, a, geometry, {c_, a, w}},
+                  walls_.moving(a));
+    if (w.criterion == Criterion::relative)
+      stream.launch(compare_displacement_boxes_kernel, w.supers, CompareDisplacementBoxes{w, a.status});
+  }
+
+  /// It stayed where it is.
+  void restore_state(Stream&, const ParticleArrays&) {}
+
+  template <bool periodic>
+  bool advance(Stream& stream, const ParticleArrays& a, const DeviceGeometry& geometry, int substeps) {
+    if (persistent_blocks_ == 0) return false;
+    with_persistent_lanes<periodic>([&](auto lanes) {
+      this->template advance_at_once<decltype(lanes)::value, periodic>(stream, a, geometry, substeps);
+    });
+    return true;
+  }
+  bool capturable() const {
+    return o_.launch != SolverOptions::Launch::plain && o_.sort == SolverOptions::Sort::counting;
+  }
+  bool grow(int longest) { return lists_.grow(n_, longest); }
+  std::size_t bytes() const {
+    return fluid_.bytes() + wall_cells_.bytes() + scratch_.bytes() + bucket_.bytes() + lists_.bytes() +
+           origin_.bytes() + boxes_.bytes() + checker_.bytes();
+  }
+
+ private:
+  bool from_cells() const { return o_.build == SolverOptions::Build::grid; }
+  Criterion criterion() const {
+    if (o_.rebuild != 0) return Criterion::interval;
+    return o_.trigger == SolverOptions::Trigger::local && from_cells() ? Criterion::relative : Criterion::displacement;
+  }
+  RebuildCriterion rebuild_criterion(Branch next_rebuild) const {
+    return {criterion(),   o_.rebuild,   origin_.get(),           fluid_.table(),
+            bucket_.get(), boxes_.get(), fluid_.table().supers(), next_rebuild};
+  }
+
+  template <bool periodic>
+  void rebuild(Stream& stream, const ParticleArrays& a, const DeviceGeometry& geometry) {
+    const FluidSource source = fluid_source(a, geometry);
+    if (from_cells()) fluid_.sort_by_counting(stream, n_, source, scratch_);
+    else stream.launch(keep_order_kernel, n_, KeepOrder{source});
+    if (criterion() == Criterion::relative)
+      stream.launch(clear_displacement_boxes_kernel, static_cast<int>(boxes_.size()),
+                    ClearDisplacementBoxes{boxes_.get()});
+    with_sub_warps<most_lanes<periodic>>(lanes_, [&](auto team) {
+      launch_build_list<typename decltype(team)::type>(stream, n_, list_build<periodic>(a));
+    });
+  }
+  template <bool periodic>
+  BuildList<periodic> list_build(const ParticleArrays& a) const {
+    // Sorted particles are copied back; those of all pairs stayed where they are.
+    return {c_,
+            a,
+            candidates(a),
+            from_cells() ? a.spare : a.state,
+            origin_.get(),
+            lists_.lists(a),
+            from_cells() ? a.state : Particles{}};
+  }
+  template <bool periodic>
+  void check_lists(Stream& stream, const ParticleArrays& a) {
+    checker_.count(stream, c_, a, candidates(a), WholeListNeighbors<periodic>{{c_}, lists_.lists(a)}, o_.rebuild == 0,
+                   scratch_);
+  }
+
+  /// call(lanes) with the number of lanes as a constant, of those that persistent kernels are compiled for.
+  template <bool periodic, class Call>
+  void with_persistent_lanes([[maybe_unused]] Call call) const {
+#ifdef __CUDACC__
+    if constexpr (!periodic)
+      if (lanes_ == 4) call(std::integral_constant<int, 4>());
+    if (lanes_ == 2) call(std::integral_constant<int, 2>());
+#else
+    call(std::integral_constant<int, 1>());
+#endif
+  }
+  std::size_t persistent_shared_bytes() const { return BuildList<false>::shared_bytes(lanes_, persistent_block); }
+  template <int lanes, bool periodic>
+  void advance_at_once(Stream& stream, const ParticleArrays& a, const DeviceGeometry& geometry, int substeps) {
+    const FluidSource source = fluid_source(a, geometry);
+    const ListNeighbors<periodic> listed = neighbors<periodic>(a);
+    const CheckDisplacement<periodic> check{c_, a, rebuild_criterion({})};
+    launch_persistent(stream, persistent_list_kernel<lanes, periodic>, persistent_blocks_, persistent_shared_bytes(),
+                      substeps,
+                      ListSubstep<periodic>{n_,
+                                            walls_.moving_count(),
+                                            a.status,
+                                            fluid_.counter(source, scratch_),
+                                            fluid_.counts(),
+                                            fluid_.starts(),
+                                            fluid_.table().buckets + 1,
+                                            reinterpret_cast<int*>(scratch_.scan.get()),
+                                            fluid_.scatter(source, scratch_),
+                                            fluid_.order(source, scratch_),
+                                            list_build<periodic>(a),
+                                            {c_, a, listed, {}},
+                                            walls_.moving<WallsFor::force>(a),
+                                            {c_, a, listed, {c_, a, geometry, check}},
+                                            walls_.moving<WallsFor::density>(a)});
+  }
+
+  FluidSource fluid_source(const ParticleArrays& a, const DeviceGeometry& geometry) const {
+    return {c_, a, a.state, a.spare, bucket_.get(), origin_.get(), geometry};
+  }
+  Candidates candidates(const ParticleArrays& a) const {
+    return wall_cells_.candidates(a, fluid_.table(), !from_cells());
+  }
+  template <bool periodic>
+  ListNeighbors<periodic> neighbors(const ParticleArrays& a) const {
+    return {{c_}, lists_.lists(a)};
+  }
+
+  // Bounds of a skin that is chosen here, and what lists are first made for; shares of H.
+  static constexpr double narrowest = 0.06, usual = 0.2, widest = 0.2;
+
+  SolverOptions o_;
+  Constants c_{};
+  LoadedScene scene_;
+  int n_ = 0, lanes_ = 1;
+  int persistent_blocks_ = 0;  // 0: substep by substep
+  float widest_skin_ = 0;      // m
+  WallStore walls_{};
+  CellSort fluid_;
+  WallCells wall_cells_;
+  SortScratch scratch_;
+  ListStorage lists_;
+  Buffer<float4> origin_;
+  Buffer<int> bucket_;
+  Buffer<DisplacementBox> boxes_;
+  ListChecker checker_;
+};
+
+}  // namespace
+
+std::unique_ptr<DeviceSolver> DECANT_EXECUTOR::make_list(const SolverOptions& options) {
+  return std::make_unique<Solver<NeighborList>>(options);
+}
+
+}  // namespace decant::gpu

@@ -1,0 +1,115 @@
+/// \file
+/// Device memory.
+#pragma once
+
+#include "gpu/core/executor.cuh"
+
+#ifdef __CUDACC__
+#include "gpu/core/cuda_check.hpp"
+#endif
+
+#include <vector>
+
+namespace decant::gpu {
+namespace {
+
+#ifdef __CUDACC__
+/// The calling thread's own, so that backends on several threads wait for nobody else's work. Whoever
+/// hands a backend to another thread does so between its calls, at whose end all is done.
+inline const cudaStream_t own_stream = cudaStreamPerThread;
+#endif
+
+/// Device memory of n elements, freed with the object.
+template <class T>
+class Buffer {
+ public:
+  Buffer() = default;
+  explicit Buffer(std::size_t n) { resize(n); }
+  Buffer(const Buffer&) = delete;
+  Buffer& operator=(const Buffer&) = delete;
+  ~Buffer() { release(); }
+
+  /// New contents are undefined; every byte is set to 0xFF, which reads as NaN or −1.
+  void resize(std::size_t n) {
+    if (n != size_) {
+      release();
+      if (n > 0) data_ = static_cast<T*>(allocate(n * sizeof(T)));
+      size_ = n;
+    }
+    fill_ones(data_, size_ * sizeof(T));
+  }
+  void upload(const std::vector<T>& from) {
+    if (size_ < from.size()) resize(from.size());
+    copy_in(data_, from.data(), from.size() * sizeof(T));
+  }
+  /// From element `first` on, where there is room.
+  void upload_at(std::size_t first, const std::vector<T>& from) {
+    copy_in(data_ + first, from.data(), from.size() * sizeof(T));
+  }
+  std::vector<T> download(std::size_t n) const {
+    std::vector<T> to(n);
+    copy_out(to.data(), data_, n * sizeof(T));
+    return to;
+  }
+  /// From an address inside.
+  void download_bytes(void* to, const void* from, std::size_t bytes) const { copy_out(to, from, bytes); }
+  T* get() const { return data_; }
+  std::size_t size() const { return size_; }
+  std::size_t bytes() const { return size_ * sizeof(T); }
+
+ private:
+#ifdef __CUDACC__
+  static void* allocate(std::size_t bytes) {
+    void* p = nullptr;
+    CUDA_CHECK(cudaMallocAsync(&p, bytes, own_stream));
+    return p;
+  }
+  static void fill_ones(void* p, std::size_t bytes) {
+    if (bytes) CUDA_CHECK(cudaMemsetAsync(p, 0xFF, bytes, own_stream));
+  }
+  /// From pageable memory, which has been read when the call returns.
+  static void copy_in(void* to, const void* from, std::size_t bytes) {
+    if (bytes) CUDA_CHECK(cudaMemcpyAsync(to, from, bytes, cudaMemcpyHostToDevice, own_stream));
+  }
+  static void copy_out(void* to, const void* from, std::size_t bytes) {
+    if (bytes == 0) return;
+    CUDA_CHECK(cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToHost, own_stream));
+    CUDA_CHECK(cudaStreamSynchronize(own_stream));
+  }
+  void release() {
+    if (data_) cudaFreeAsync(data_, own_stream);  // a destructor has nobody to report to
+    data_ = nullptr;
+    size_ = 0;
+  }
+#else
+  static void* allocate(std::size_t bytes) { return ::operator new(bytes, std::align_val_t(64)); }
+  static void fill_ones(void* p, std::size_t bytes) {
+    if (bytes) std::memset(p, 0xFF, bytes);
+  }
+  static void copy_in(void* to, const void* from, std::size_t bytes) {
+    if (bytes) std::memcpy(to, from, bytes);
+  }
+  static void copy_out(void* to, const void* from, std::size_t bytes) {
+    if (bytes) std::memcpy(to, from, bytes);
+  }
+  void release() {
+    ::operator delete(data_, std::align_val_t(64));
+    data_ = nullptr;
+    size_ = 0;
+  }
+#endif
+  T* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+/// The next `count` elements of a buffer that several arrays share, from byte `offset` on, which moves behind
+/// them.
+template <class T>
+T* carve(const Buffer<char>& from, std::size_t& offset, std::size_t count) {
+  T* p = reinterpret_cast<T*>(from.get() + offset);
+  offset += count * sizeof(T);
+  return p;
+}
+
+}  // namespace
+}  // namespace decant::gpu

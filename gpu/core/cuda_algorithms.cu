@@ -1,0 +1,32 @@
+#include "gpu/core/algorithms.hpp"
+#include "gpu/core/cuda_check.hpp"
+
+#include <thrust/binary_search.h>
+#include <thrust/iterator/counting_iterator.h>
+#include <thrust/sort.h>
+#include <thrust/system/cuda/execution_policy.h>
+#include <cub/device/device_scan.cuh>
+
+namespace decant::gpu::cuda {
+
+void exclusive_scan(const int* in, int* out, int n, void* scratch, std::size_t bytes, void* stream) {
+  CUDA_CHECK(cub::DeviceScan::ExclusiveSum(scratch, bytes, in, out, n, static_cast<cudaStream_t>(stream)));
+}
+
+std::size_t scan_bytes(int n) {
+  std::size_t bytes = 0;
+  CUDA_CHECK(
+      cub::DeviceScan::ExclusiveSum(nullptr, bytes, static_cast<const int*>(nullptr), static_cast<int*>(nullptr), n));
+  return bytes;
+}
+
+void sort_by_key(int* keys, int* values, int n, void* stream) {
+  thrust::stable_sort_by_key(thrust::cuda::par.on(static_cast<cudaStream_t>(stream)), keys, keys + n, values);
+}
+
+void lower_bounds(const int* keys, int n, int* out, int count, void* stream) {
+  thrust::lower_bound(thrust::cuda::par.on(static_cast<cudaStream_t>(stream)), keys, keys + n,
+                      thrust::counting_iterator<int>(0), thrust::counting_iterator<int>(count), out);
+}
+
+}  // namespace decant::gpu::cuda

@@ -1,0 +1,72 @@
+/// \file
+/// The device arrays of one scene, as kernels see them: fluid particles, padded to whole tiles, then the wall
+/// particles of each container, padded likewise, then one sentinel far from everything.
+#pragma once
+
+#include "gpu/core/device_scene.hpp"
+#include "gpu/core/device_status.cuh"
+
+namespace decant::gpu {
+namespace {
+
+/// Particles per thread block tile; arrays that tiles are cut from are padded to a multiple of it.
+inline constexpr int tile_size = 256;
+
+DECANT_BOTH int padded(int n) { return (n + tile_size - 1) / tile_size * tile_size; }
+
+// Positions are read several at a time, this far beyond the last.
+inline constexpr std::size_t read_past_end = 24;
+
+/// Position: x, y, z and the mass m, of wall particles ρ0 V_b (brute force: |x|²); velocity: x, y, z and the
+/// wall clearance, a distance (m) that all containers' solids keep at least; 0: nothing is known.
+struct Particles {
+  float4 *position, *velocity;
+};
+
+struct ParticleArrays {
+  int n;                   // fluid particles
+  int base;                // where wall particles begin: n, rounded up to whole tiles
+  int sentinel;            // index of the last element
+  Particles state, spare;  // the state between advances, and as much room again
+  Particles current;       // where the substep begins, in the order in which kernels run
+  Particles next;          // where it ends, same order
+  int* id;                 // of each fluid particle, same order
+  // What neighbors read in the force kernel: x, y, z, p/ρ² and v, 1/ρ; of wall particles x, y, z, 0 and
+  // v, V_b.
+  float4 *force_position, *force_velocity;
+  float4* acceleration;  // may lie over `current.position`, which only the density kernel reads
+  bool stores_square;    // positions carry |x|²
+  DeviceStatus* status;
+  const DevicePose* poses;  // [(substeps + 1) × containers], substep major
+  int containers;
+
+  /// At the start of the substep, for all that comes before integration, and at its end, for all that
+  /// comes after the densities: the one counts what has ended, the other what has begun.
+  DECANT_DEVICE const DevicePose* poses_before() const { return poses_of(status->substeps_ended); }
+  DECANT_DEVICE const DevicePose* poses_after() const { return poses_of(status->substeps_begun); }
+
+ private:
+  DECANT_DEVICE const DevicePose* poses_of(unsigned substep) const {
+    return poses + static_cast<std::size_t>(substep) * static_cast<std::size_t>(containers);
+  }
+};
+
+/// Results of an evaluation, by id; vectors are [n,3]. All null in an advance.
+struct OutputArrays {
+  float *density, *pressure;
+  float *pressure_acceleration, *viscous_acceleration, *wall_pressure_acceleration, *wall_viscous_acceleration,
+      *acceleration;
+  int *fluid_count, *wall_count;
+  long long *fluid_id_sum, *wall_id_sum;
+};
+
+/// v as row `id` of a [n,3] array.
+DECANT_DEVICE void store(float* to, int id, Float3 v) {
+  const auto k = 3 * static_cast<std::size_t>(id);
+  to[k] = v.x;
+  to[k + 1] = v.y;
+  to[k + 2] = v.z;
+}
+
+}  // namespace
+}  // namespace decant::gpu

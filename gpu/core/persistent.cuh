@@ -1,0 +1,208 @@
+/// \file
+/// One kernel for many substeps. Between two launches that depend on each other a chip of 100,000 threads
+/// stands still for two to three microseconds, and for four where the device decides what comes next;
+/// threads that stay where they are wait for each other in little more than one. For sizes that do not
+/// fill the chip, where that is most of a substep.
+///
+/// A persistent grid has one block per multiprocessor, all there at once. Each block has a run of neighboring
+/// particles, so that what it reads stays in its cache. On the host it is one thread that starts OpenMP's.
+#pragma once
+
+#include "gpu/core/stream.cuh"
+
+#include <algorithm>
+
+#ifdef __CUDACC__
+#include <cooperative_groups.h>
+#include <cub/block/block_scan.cuh>
+#define DECANT_GRID_CONSTANT __grid_constant__
+#else
+#include <chrono>
+#define DECANT_GRID_CONSTANT
+#endif
+
+namespace decant::gpu {
+namespace {
+
+/// Threads per block; as many as find room with 72 registers each.
+inline constexpr int persistent_block = 896;
+/// Blocks that a scan has sums for.
+inline constexpr int most_persistent_blocks = 1024;
+
+#ifdef __CUDACC__
+
+class PersistentGrid {
+ public:
+  DECANT_DEVICE void sync() const { cooperative_groups::this_grid().sync(); }
+
+  /// body(i) for i in 0 … n−1.
+  template <class Body>
+  DECANT_DEVICE void for_each(int n, const Body& body) const {
+    share<1>(n, [&](int i) DECANT_INLINE { body(i); });
+  }
+  /// body(team) with a SubWarp<lanes> for each of n particles.
+  template <int lanes, class Body>
+  DECANT_DEVICE void for_each_team(int n, const Body& body) const {
+    share<lanes>(n, [&](int i) DECANT_INLINE {
+      SubWarp<lanes> team(i);
+      body(team);
+    });
+  }
+  /// out[k] = in[0] + … + in[k−1], k < n; both have room for whole fours. Each block sums a share, and then adds
+  /// up those before its own: block_sums[blocks].
+  DECANT_DEVICE void exclusive_scan(const int* from, int* to, int n, int* block_sums) const {
+    using Scan = cub::BlockScan<int, persistent_block>;
+    __shared__ typename Scan::TempStorage memory;
+    const int blocks = static_cast<int>(gridDim.x), block = static_cast<int>(blockIdx.x);
+    const int thread = static_cast<int>(threadIdx.x);
+    const int fours = (n + 3) / 4, each = (fours + blocks - 1) / blocks;
+    const int begin = each * block < fours ? each * block : fours;
+    const int end = begin + each < fours ? begin + each : fours;
+    const int4* in = reinterpret_cast<const int4*>(from);
+    int4* out = reinterpret_cast<int4*>(to);
+    const auto total = [&](int value) DECANT_INLINE {
+      int before, all;
+      Scan(memory).ExclusiveSum(value, before, all);
+      __syncthreads();
+      return all;
+    };
+    int sum = 0;
+    for (int k = begin + thread; k < end; k += persistent_block) {
+      const int4 v = in[k];
+      sum += v.x + v.y + v.z + v.w;
+    }
+    sum = total(sum);
+    if (thread == 0) block_sums[block] = sum;
+    sync();
+    sum = 0;
+    for (int k = thread; k < block; k += persistent_block) sum += block_sums[k];
+    int before = total(sum);
+    for (int first = begin; first < end; first += persistent_block) {
+      const int k = first + thread;
+      const int4 v = k < end ? in[k] : make_int4(0, 0, 0, 0);
+      int ahead, all;
+      Scan(memory).ExclusiveSum(v.x + v.y + v.z + v.w, ahead, all);
+      __syncthreads();
+      ahead += before;
+      if (k < end) out[k] = make_int4(ahead, ahead + v.x, ahead + v.x + v.y, ahead + v.x + v.y + v.z);
+      before += all;
+    }
+  }
+
+ private:
+  /// body(i) for i in 0 … n−1, with so many threads side by side for each.
+  template <int lanes, class Body>
+  DECANT_DEVICE void share(int n, Body&& body) const {
+    constexpr int per_warp = 32 / lanes, warps = persistent_block / 32;
+    const int thread = static_cast<int>(threadIdx.x), runs = (n + per_warp - 1) / per_warp;
+    const int blocks = static_cast<int>(gridDim.x), block = static_cast<int>(blockIdx.x);
+    const int begin = first_of(runs, block, blocks), end = first_of(runs, block + 1, blocks);
+#pragma unroll 1
+    for (int run = begin + thread / 32; run < end; run += warps) {
+      const int i = run * per_warp + thread % 32 / lanes;
+      if (i < n) body(i);
+    }
+  }
+  DECANT_DEVICE static int first_of(int runs, int block, int blocks) {
+    return static_cast<int>(static_cast<long long>(runs) * block / blocks);
+  }
+};
+
+/// Nanoseconds from one lap to the next, by one thread of all.
+class PersistentTimer {
+ public:
+  DECANT_DEVICE explicit PersistentTimer(long long* stage_ns) : stage_ns_(stage_ns), last_(now()) {}
+  DECANT_DEVICE void lap(int stage) {
+    if (blockIdx.x != 0 || threadIdx.x != 0) return;
+    const long long time = now();
+    stage_ns_[stage] += time - last_;
+    last_ = time;
+  }
+
+ private:
+  DECANT_DEVICE static long long now() {
+    long long ns;
+    asm volatile("mov.u64 %0, %globaltimer;" : "=l"(ns));
+    return ns;
+  }
+  long long *stage_ns_, last_;
+};
+
+/// Blocks of a persistent grid that runs the kernel with so many bytes of shared memory per block, or 0 where
+/// there is no room for one on each multiprocessor.
+template <class Kernel>
+int persistent_blocks(Kernel kernel, std::size_t shared_bytes) {
+  int device = 0, blocks = 0, cooperates = 0, most_shared = 0, resident = 0;
+  CUDA_CHECK(cudaGetDevice(&device));
+  CUDA_CHECK(cudaDeviceGetAttribute(&blocks, cudaDevAttrMultiProcessorCount, device));
+  CUDA_CHECK(cudaDeviceGetAttribute(&cooperates, cudaDevAttrCooperativeLaunch, device));
+  CUDA_CHECK(cudaDeviceGetAttribute(&most_shared, cudaDevAttrMaxSharedMemoryPerBlockOptin, device));
+  cudaFuncAttributes attributes{};
+  CUDA_CHECK(cudaFuncGetAttributes(&attributes, kernel));
+  if (!cooperates || shared_bytes + attributes.sharedSizeBytes > static_cast<std::size_t>(most_shared)) return 0;
+  CUDA_CHECK(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(shared_bytes)));
+  CUDA_CHECK(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, kernel, persistent_block, shared_bytes));
+  return resident < 1 ? 0 : std::min(blocks, most_persistent_blocks);
+}
+
+/// kernel(times, argument) by a persistent grid of so many blocks.
+template <class Argument>
+void launch_persistent(Stream& stream, void (*kernel)(int, Argument), int blocks, std::size_t shared_bytes, int times,
+                       const Argument& argument) {
+  cudaLaunchAttribute together{};
+  together.id = cudaLaunchAttributeCooperative;
+  together.val.cooperative = 1;
+  cudaLaunchConfig_t launch{};
+  launch.gridDim = static_cast<unsigned>(blocks);
+  launch.blockDim = persistent_block;
+  launch.dynamicSmemBytes = shared_bytes;
+  launch.stream = stream.handle();
+  launch.attrs = &together;
+  launch.numAttrs = 1;
+  CUDA_CHECK(cudaLaunchKernelEx(&launch, kernel, times, argument));
+}
+
+#else
+
+class PersistentGrid {
+ public:
+  void sync() const {}
+  template <class Body>
+  void for_each(int n, const Body& body) const {
+    for_each_thread(n, body);
+  }
+  template <int lanes, class Body>
+  void for_each_team(int n, const Body& body) const {
+    ForEachTeam<SubWarp<lanes>, Body>::run(n, body);
+  }
+  void exclusive_scan(const int* in, int* out, int n, int*) const { host::exclusive_scan(in, out, n); }
+};
+
+class PersistentTimer {
+ public:
+  explicit PersistentTimer(long long* stage_ns) : stage_ns_(stage_ns) {}
+  void lap(int stage) {
+    const auto now = Clock::now();
+    stage_ns_[stage] += std::chrono::duration_cast<std::chrono::nanoseconds>(now - last_).count();
+    last_ = now;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  long long* stage_ns_;
+  Clock::time_point last_ = Clock::now();
+};
+
+template <class Kernel>
+int persistent_blocks(Kernel, std::size_t) {
+  return 1;
+}
+template <class Argument>
+void launch_persistent(Stream&, void (*kernel)(int, Argument), int, std::size_t, int times, const Argument& argument) {
+  kernel(times, argument);
+}
+
+#endif
+
+}  // namespace
+}  // namespace decant::gpu

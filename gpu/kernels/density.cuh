@@ -1,0 +1,91 @@
+/// \file
+/// Density by summation, ρ_i = Σ w_j W_ij over fluid and wall particles, itself included, and the pressure that
+/// follows from it. Every particle leaves what its neighbors read in the force kernel: p/ρ² and 1/ρ.
+#pragma once
+
+#include "gpu/core/teams.cuh"
+#include "gpu/physics/equation_of_state.cuh"
+#include "gpu/physics/sph_kernels.cuh"
+
+namespace decant::gpu {
+namespace {
+
+template <class Neighbors>
+struct Density {
+  Constants c;
+  ParticleArrays a;
+  Neighbors neighbors;
+  OutputArrays out;
+
+  template <class Team>
+  DECANT_DEVICE void operator()(Team& team) const {
+    Float3 x[Team::particles_per_thread];
+    float sum[Team::particles_per_thread];
+#pragma unroll
+    for (int k = 0; k < Team::particles_per_thread; ++k) x[k] = xyz(a.current.position[team.particle(k)]);
+    with_kernel(c, [&](auto kernel) DECANT_INLINE {
+      // The particle itself is counted once.
+      const float own = team.is_leader() ? c.mass * kernel.w(c, {0.0f, 0.0f}) : 0.0f;
+#pragma unroll
+      for (int k = 0; k < Team::particles_per_thread; ++k) sum[k] = own;
+      neighbors.for_each(team, x, a.current.position, [&](int k, int j, float4 other, Float3, float r2) DECANT_INLINE {
+        sum[k] += neighbors.weight(j, other) * kernel.w(c, radius(r2));
+      });
+    });
+#pragma unroll
+    for (int k = 0; k < Team::particles_per_thread; ++k) finish(team, k, x[k], sum[k]);
+  }
+
+ private:
+  template <class Team>
+  DECANT_DEVICE void finish(Team& team, int k, Float3 x, float sum) const {
+    const float density = team.sum(sum);
+    if (!team.active(k) || !team.is_leader()) return;
+    const int i = team.particle(k);
+    if (i == 0) begin_substep();
+    const float p = pressure_at(c, density);
+    const float4 v = a.current.velocity[i];
+    a.force_position[i] = make_float4(x.x, x.y, x.z, p / (density * density));
+    a.force_velocity[i] = make_float4(v.x, v.y, v.z, 1.0f / density);
+    if (!out.density) return;
+    const int id = a.id[i];
+    out.density[id] = density;
+    out.pressure[id] = p;
+  }
+  DECANT_DEVICE void begin_substep() const {
+    ++a.status->substeps_begun;
+    const DevicePose* poses = a.poses_after();
+    float step = 0.0f;
+    // An evaluation has the poses of its time alone, and nothing moves.
+    for (int k = 0; k < a.containers && !out.density; ++k) step = fmaxf(step, poses[k].step);
+    a.status->wall_step = step;
+    a.status->wall_displacement += step;
+  }
+};
+
+template <class Team, class Neighbors>
+DECANT_KERNEL(Team::block_size, Team::blocks_per_multiprocessor)
+density_kernel(int n, Density<Neighbors> density) {
+  for_each_team<Team>(n, density);
+}
+
+/// p/ρ² and 1/ρ from density and pressure given from outside, by id; and the pressure that follows from that
+/// density, which stands in for one that is not given.
+struct UseGivenDensity {
+  Constants c;
+  ParticleArrays a;
+  const float *density, *pressure;  // pressure null: not given
+  float* own_pressure;
+
+  DECANT_DEVICE void operator()(int i) const {
+    const int id = a.id[i];
+    const float own = pressure_at(c, density[id]);
+    own_pressure[id] = own;
+    a.force_position[i].w = (pressure ? pressure[id] : own) / (density[id] * density[id]);
+    a.force_velocity[i].w = 1.0f / density[id];
+  }
+};
+DECANT_KERNEL(256) use_given_density_kernel(int n, UseGivenDensity use) { for_each_thread(n, use); }
+
+}  // namespace
+}  // namespace decant::gpu

@@ -1,0 +1,71 @@
+/// \file
+/// The end of a substep: semi-implicit Euler, periodic wrap, contact with containers and floor, and the checks
+/// of the device status.
+#pragma once
+
+#include "gpu/kernels/place_walls.cuh"
+
+namespace decant::gpu {
+namespace {
+
+/// What else becomes of a particle at its new position: nothing.
+struct NothingElse {
+  struct Prefetched {};
+  DECANT_DEVICE Prefetched prefetch(int) const { return {}; }
+  DECANT_DEVICE void operator()(int, Float3, Prefetched) const {}
+};
+
+/// Moves particle i. after(i, x, prefetched) sees the new position, and what after.prefetch(i) has read
+/// together with what is read here. Contact is left out where a particle and the walls have not moved enough
+/// since its clearance was last computed for a touch.
+template <class After>
+struct Integrate {
+  Constants c;
+  ParticleArrays a;
+  DeviceGeometry geometry;
+  After after;
+
+  DECANT_DEVICE void operator()(int i, Float3 x, Float3 v, Float3 acceleration) const {
+    const auto prefetched = after.prefetch(i);
+    const float old_clearance = a.current.velocity[i].w, wall_step = a.status->wall_step;
+    if (i == 0) ++a.status->substeps_ended;
+    v = v + c.dt * acceleration;
+    const Float3 displacement = c.dt * v;
+    x = x + displacement;
+    x = {wrap(0, x.x), wrap(1, x.y), wrap(2, x.z)};
+    const float rounding = rounding_of(x);
+    float clearance = old_clearance - (1.001f * (sqrtf(dot(displacement, displacement)) + wall_step) + rounding);
+    if (!(clearance > 1.001f * c.contact_distance + rounding)) clearance = collide(c, geometry, a.poses_after(), x, v);
+    if (collide_with_floor(c, x, v)) clearance = 0.0f;
+    if (!is_finite(x) || !is_finite(v)) report(&a.status->non_finite, a.status->substeps_begun, a.id[i]);
+    else if (escaped(0, x.x) || escaped(1, x.y) || escaped(2, x.z))
+      report(&a.status->escaped, a.status->substeps_begun, a.id[i]);
+    a.next.position[i] = a.stores_square ? with_square(x) : make_float4(x.x, x.y, x.z, c.mass);
+    a.next.velocity[i] = make_float4(v.x, v.y, v.z, clearance);
+    after(i, x, prefetched);
+  }
+
+ private:
+  DECANT_DEVICE float wrap(int axis, float x) const {
+    if (!c.periodic[axis]) return x;
+    return x - c.period[axis] * floorf((x - c.domain_min[axis]) * c.inverse_period[axis]);
+  }
+  DECANT_DEVICE bool escaped(int axis, float x) const {
+    return !c.periodic[axis] && !(x >= c.domain_min[axis] && x <= c.domain_max[axis]);
+  }
+};
+
+/// By the accelerations that were stored; threads after the particles' place moving walls at the end of the
+/// substep.
+template <class After>
+DECANT_KERNEL(256)
+integrate_kernel(int particles_and_walls, Integrate<After> integrate, PlaceWalls<WallsFor::both> walls) {
+  for_each_thread(particles_and_walls, [&](int i) {
+    const ParticleArrays& a = integrate.a;
+    if (i >= a.n) return walls(i - a.n);
+    integrate(i, xyz(a.force_position[i]), xyz(a.force_velocity[i]), xyz(a.acceleration[i]));
+  });
+}
+
+}  // namespace
+}  // namespace decant::gpu

@@ -1,0 +1,75 @@
+/// \file
+/// What an executor offers the host side of a backend: plain arrays in, plain arrays out. Knows
+/// neither Eigen nor the scene, so that device code can implement it.
+#pragma once
+
+#include "gpu/core/device_scene.hpp"
+#include "gpu/options.hpp"
+#include "oracle/backend.hpp"
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace decant::gpu {
+
+/// Everything a solver needs to start.
+struct Problem {
+  Constants constants;
+  Geometry geometry;
+  Box region;  // of make_region
+  WallSamples walls;
+  std::vector<float> position, velocity;  // [N,3] row-major, m, m/s
+};
+
+/// Fields in id order, as state.hpp names them; vectors are [N,3] row-major.
+struct HostFields {
+  std::vector<float> boundary_volume, density, pressure;
+  std::vector<float> pressure_acceleration, viscous_acceleration, wall_pressure_acceleration, wall_viscous_acceleration,
+      acceleration;
+  std::vector<std::int64_t> fluid_count, fluid_id_sum, wall_count, wall_id_sum;
+};
+
+/// Oracle's inputs for later stages; empty: not given. Pressure comes with density.
+struct GivenInputs {
+  std::vector<float> boundary_volume, density, pressure;
+};
+
+class DeviceSolver {
+ public:
+  virtual ~DeviceSolver() = default;
+  virtual void load(const Problem& problem) = 0;
+  /// Fields at the present state, from what an advance left in use; `poses` one a container.
+  virtual Status evaluate(const std::vector<DevicePose>& poses, const GivenInputs& given, HostFields& out) = 0;
+  /// `substeps` onward; `poses` holds substeps + 1 sets, the first at the present time.
+  virtual Status advance(int substeps, const std::vector<DevicePose>& poses) = 0;
+  virtual void read(std::vector<float>& position, std::vector<float>& velocity) const = 0;
+  virtual StageTimes stage_times() const = 0;
+  /// How often neighbors were looked for anew, since `load`.
+  virtual std::int64_t rebuilds() const = 0;
+  /// What lists that verify themselves counted, since `load`.
+  virtual PairTotals pair_totals() const = 0;
+  /// Device memory held.
+  virtual std::size_t device_bytes() const = 0;
+};
+
+/// The names of the backends under test. A new one is a line here and a file in backends/ with its factory, for
+/// both executors.
+#define DECANT_BACKENDS(entry) entry(brute) entry(hash) entry(list)
+
+/// Factories of one executor, and what it runs on.
+#define DECANT_DECLARE(name) std::unique_ptr<DeviceSolver> make_##name(const SolverOptions& options);
+namespace host {
+DECANT_BACKENDS(DECANT_DECLARE)
+std::string device();
+std::string thrust_version();
+}  // namespace host
+namespace cuda {
+DECANT_BACKENDS(DECANT_DECLARE)
+/// Empty where no device can be used; `why_not` says why.
+std::string device(std::string* why_not);
+}  // namespace cuda
+#undef DECANT_DECLARE
+
+}  // namespace decant::gpu

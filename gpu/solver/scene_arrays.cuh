@@ -1,0 +1,230 @@
+/// \file
+/// The device memory of one loaded scene: constants, geometry, poses, fluid state, walls, device status.
+#pragma once
+
+#include "gpu/solver/context.cuh"
+#include "gpu/solver/device_solver.hpp"
+#include "reference/error.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace decant::gpu {
+namespace {
+
+class SceneArrays {
+ public:
+  explicit SceneArrays(bool stores_square) : stores_square_(stores_square) {}
+
+  void load(const Problem& problem) {
+    c_ = problem.constants;
+    containers_ = static_cast<int>(problem.geometry.shapes.size());
+    n_ = static_cast<int>(problem.position.size() / 3);
+    load_geometry(problem.geometry);
+    load_walls(problem.walls);
+    allocate();
+    upload_rows(state_.position, problem.position, [this](float square) { return stores_square_ ? square : c_.mass; });
+    upload_rows(state_.velocity, problem.velocity, [](float) { return 0.0f; });
+    std::vector<int> ids(id_.size());
+    for (std::size_t i = 0; i < ids.size(); ++i) ids[i] = static_cast<int>(i);
+    id_.upload(ids);
+    place_sentinel();
+  }
+
+  const Constants& constants() const { return c_; }
+  const DeviceGeometry& geometry() const { return geometry_; }
+  const WallStore& walls() const { return walls_; }
+  int particles() const { return n_; }
+  /// All but which of them hold the state at a substep's start and end.
+  ParticleArrays arrays() {
+    ParticleArrays a{};
+    a.n = n_;
+    a.base = padded(n_);
+    a.sentinel = sentinel();
+    a.state = {state_.position.get(), state_.velocity.get()};
+    a.spare = {spare_.position.get(), spare_.velocity.get()};
+    a.id = id_.get();
+    a.force_position = force_position_.get();
+    a.force_velocity = force_velocity_.get();
+    a.acceleration = spare_.position.get();
+    a.stores_square = stores_square_;
+    a.status = status_.get();
+    a.poses = poses_.get();
+    a.containers = containers_;
+    return a;
+  }
+
+  /// Whether they lie elsewhere than before.
+  bool upload_poses(const std::vector<DevicePose>& poses) {
+    const bool grows = poses.size() > poses_.size();
+    if (grows) poses_.resize(2 * poses.size());
+    poses_.upload(poses);
+    return grows;
+  }
+  DeviceStatus status() const { return status_.download(1)[0]; }
+  void set_status(const DeviceStatus& status) { status_.upload({status}); }
+  std::vector<float> boundary_volumes() const { return wall_volume_.download(static_cast<std::size_t>(m_)); }
+  void set_boundary_volumes(const std::vector<float>& volume) { wall_volume_.upload(volume); }
+
+  void save_state(Stream& stream) {
+    each_saved([&](void* from, void* to, std::size_t bytes) { stream.copy(to, from, bytes); });
+  }
+  void restore_state(Stream& stream) {
+    each_saved([&](void* to, void* from, std::size_t bytes) { stream.copy(to, from, bytes); });
+  }
+  /// [n,3] each, by id.
+  void read(std::vector<float>& position, std::vector<float>& velocity) const {
+    const auto n = static_cast<std::size_t>(n_);
+    const std::vector<int> id = id_.download(n);
+    position = by_id(state_.position.download(n), id);
+    velocity = by_id(state_.velocity.download(n), id);
+  }
+
+  std::size_t bytes() const {
+    return state_.bytes() + spare_.bytes() + id_.bytes() + force_position_.bytes() + force_velocity_.bytes() +
+           saved_.bytes() + wall_local_.bytes() + wall_id_.bytes() + wall_container_.bytes() + wall_volume_.bytes();
+  }
+
+ private:
+  struct ParticleBuffers {
+    Buffer<float4> position, velocity;
+    std::size_t bytes() const { return position.bytes() + velocity.bytes(); }
+  };
+
+  /// Padding is nowhere: no comparison with NaN holds, so it is nobody's neighbor.
+  static constexpr float nowhere = std::numeric_limits<float>::quiet_NaN();
+  static constexpr std::size_t saved_bytes = 2 * 16 + 4;  // per particle
+
+  void load_geometry(const Geometry& geometry) {
+    shapes_.upload(geometry.shapes);
+    edges_.upload(geometry.edges);
+    boxes_.upload(geometry.boxes);
+    faces_.upload(geometry.faces);
+    geometry_ = {containers_, shapes_.get(), edges_.get(), boxes_.get(), faces_.get(), {}, {}};
+    const auto copy_first = [](const auto& all, auto& first) {
+      for (std::size_t k = 0; k < std::min(all.size(), std::size(first)); ++k) first[k] = all[k];
+    };
+    copy_first(geometry.shapes, geometry_.first_shapes);
+    copy_first(geometry.edges, geometry_.first_edges);
+  }
+
+  void load_walls(const WallSamples& walls) {
+    std::vector<float> rows;
+    std::vector<int> ids, containers;
+    walls_ = {};
+    bool any_moves = false;
+    for (std::size_t c = 0; c + 1 < walls.container_begin.size(); ++c) {
+      WallSegment s{};
+      s.begin = static_cast<int>(ids.size());
+      float low[3] = {0, 0, 0}, high[3] = {0, 0, 0};
+      for (int b = walls.container_begin[c]; b < walls.container_begin[c + 1]; ++b) {
+        const auto k = static_cast<std::size_t>(b);
+        const float x[3] = {walls.x[k], walls.y[k], walls.z[k]};
+        for (int a = 0; a < 3; ++a) {
+          low[a] = b == walls.container_begin[c] ? x[a] : std::min(low[a], x[a]);
+          high[a] = b == walls.container_begin[c] ? x[a] : std::max(high[a], x[a]);
+        }
+        rows.insert(rows.end(), {x[0], x[1], x[2]});
+        ids.push_back(b);
+      }
+      s.end = static_cast<int>(ids.size());
+      s.low = {low[0], low[1], low[2]};
+      s.high = {high[0], high[1], high[2]};
+      const auto whole = static_cast<std::size_t>(padded(s.end));
+      rows.resize(3 * whole, nowhere);
+      ids.resize(whole, -1);
+      containers.resize(whole, static_cast<int>(c));
+      if (walls.container_moves[c]) {
+        if (!any_moves) walls_.first_moving = s.begin;
+        any_moves = true;
+        walls_.moving_end = s.end;
+      }
+      walls_.segments.push_back(s);
+      walls_.moves.push_back(walls.container_moves[c]);
+    }
+    m_ = static_cast<int>(walls.x.size());
+    wall_local_.resize(ids.size());
+    upload_rows(wall_local_, rows, [](float) { return 0.0f; });
+    wall_id_.upload(ids);
+    wall_container_.upload(containers);
+    wall_volume_.resize(static_cast<std::size_t>(m_));
+    walls_.walls = {wall_local_.get(), wall_id_.get(), wall_container_.get(), wall_volume_.get(), c_.rest_density};
+  }
+
+  void allocate() {
+    const auto n = static_cast<std::size_t>(n_);
+    const auto all = static_cast<std::size_t>(sentinel()) + 1 + read_past_end;
+    state_.position.resize(all);
+    state_.velocity.resize(n);
+    spare_.position.resize(all);
+    spare_.velocity.resize(n);
+    id_.resize(n);
+    force_position_.resize(all);
+    force_velocity_.resize(all);
+    saved_.resize(n * saved_bytes);
+    status_.resize(1);
+  }
+  int sentinel() const { return padded(n_) + walls_.padded_total(); }
+  /// In the arrays that neighbors are read from. Its squared distance is finite.
+  void place_sentinel() {
+    const std::vector<float4> far{make_float4(1e12f, 1e12f, 1e12f, 0.0f)}, none{make_float4(0, 0, 0, 0)};
+    const auto at = static_cast<std::size_t>(sentinel());
+    for (Buffer<float4>* positions : {&state_.position, &spare_.position, &force_position_})
+      positions->upload_at(at, far);
+    force_velocity_.upload_at(at, none);
+  }
+
+  /// With a fourth component, of |row|².
+  template <class Fourth>
+  static void upload_rows(Buffer<float4>& to, const std::vector<float>& rows, Fourth fourth) {
+    std::vector<float4> points(to.size(), make_float4(nowhere, nowhere, nowhere, 0.0f));
+    for (std::size_t i = 0; 3 * i + 2 < rows.size(); ++i) {
+      const float x = rows[3 * i], y = rows[3 * i + 1], z = rows[3 * i + 2];
+      points[i] = make_float4(x, y, z, fourth(x * x + y * y + z * z));
+    }
+    to.upload(points);
+  }
+  static std::vector<float> by_id(const std::vector<float4>& points, const std::vector<int>& id) {
+    std::vector<float> rows(3 * points.size(), nowhere);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const auto k = 3 * static_cast<std::size_t>(id[i]);
+      if (k + 2 >= rows.size()) throw BackendError("an id out of range came back");
+      rows[k] = points[i].x;
+      rows[k + 1] = points[i].y;
+      rows[k + 2] = points[i].z;
+    }
+    return rows;
+  }
+
+  /// each(part of the state, its place in saved_, bytes)
+  template <class Each>
+  void each_saved(Each each) {
+    std::size_t at = 0;
+    const auto n = static_cast<std::size_t>(n_);
+    each(state_.position.get(), carve<float4>(saved_, at, n), n * sizeof(float4));
+    each(state_.velocity.get(), carve<float4>(saved_, at, n), n * sizeof(float4));
+    each(id_.get(), carve<int>(saved_, at, n), n * sizeof(int));
+  }
+
+  bool stores_square_;
+  Constants c_{};
+  int containers_ = 0, n_ = 0, m_ = 0;
+  Buffer<Shape> shapes_;
+  Buffer<Edge> edges_;
+  Buffer<Box> boxes_;
+  Buffer<Face> faces_;
+  DeviceGeometry geometry_{};
+  Buffer<DevicePose> poses_;
+  ParticleBuffers state_, spare_;
+  Buffer<int> id_;
+  Buffer<float4> force_position_, force_velocity_;
+  Buffer<char> saved_;  // the state before an advance
+  Buffer<DeviceStatus> status_;
+  WallStore walls_{};
+  Buffer<float4> wall_local_;
+  Buffer<int> wall_id_, wall_container_;
+  Buffer<float> wall_volume_;
+};
+
+}  // namespace
+}  // namespace decant::gpu

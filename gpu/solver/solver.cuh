@@ -1,0 +1,322 @@
+/// \file
+/// A solver from a neighbor search: owns the device arrays and runs the stages of substeps in order, all on the
+/// device. Substeps are captured in CUDA graphs where the search allows; one small read-back per `advance` tells
+/// of errors.
+///
+/// A search that finds its lists too short says so in the device status. What was computed since is thrown
+/// away: the state before is restored, the lists grow, and the same substeps run again.
+#pragma once
+
+#include "gpu/concepts.hpp"
+#include "gpu/kernels/density.cuh"
+#include "gpu/kernels/diagnostics.cuh"
+#include "gpu/kernels/force.cuh"
+#include "gpu/solver/device_solver.hpp"
+#include "gpu/solver/output_buffers.cuh"
+#include "gpu/solver/scene_arrays.cuh"
+#include "reference/error.hpp"
+
+#include <algorithm>
+
+namespace decant::gpu {
+namespace {
+
+template <NeighborSearch Search>
+class Solver : public DeviceSolver {
+ public:
+  explicit Solver(const SolverOptions& options) : search_(options), scene_(Search::stores_square) {}
+
+  void load(const Problem& problem) override {
+    loaded_ = false;  // should anything below fail
+    long_graph_.clear();
+    short_graph_.clear();
+    scene_.load(problem);
+    times_ = {};
+    rebuilds_ = advances_ = 0;
+    totals_ = {};
+    search_.load(stream_, c(), arrays(), scene_.walls(), problem.region);
+    stream_.wait();
+    in_use_ = Structures::none;
+    loaded_ = true;
+  }
+
+  Status evaluate(const std::vector<DevicePose>& poses, const GivenInputs& given, HostFields& out) override {
+    require_loaded();
+    upload_poses(poses);
+    std::vector<float> own_volume = scene_.boundary_volumes();
+    if (!given.boundary_volume.empty()) scene_.set_boundary_volumes(given.boundary_volume);
+    DeviceStatus status;
+    do {
+      if (in_use_ != Structures::none && given.boundary_volume.empty()) resume();
+      else begin();
+      const OutputArrays fields = output_.unwritten(scene_.particles());
+      with_periodic(c(),
+                    [&](auto periodic) { this->template compute_fields<decltype(periodic)::value>(given, fields); });
+      stream_.wait();
+      status = scene_.status();
+      in_use_ = Structures::none;
+    } while (grow(status));
+    output_.download(out);
+    output_.clear();  // memory that a run does not need
+    scene_.set_boundary_volumes(own_volume);
+    out.boundary_volume = std::move(own_volume);
+    return status_of(status);
+  }
+
+  Status advance(int substeps, const std::vector<DevicePose>& poses) override {
+    require_loaded();
+    upload_poses(poses);
+    in_use_ = Structures::none;  // should anything below fail
+    scene_.save_state(stream_);
+    DeviceStatus status;
+    for (;;) {
+      begin();
+      in_use_ = run(substeps);
+      stream_.wait();
+      status = scene_.status();
+      if (!grow(status)) break;
+      scene_.restore_state(stream_);
+    }
+    timer_.read();
+    rebuilds_ += status.rebuilds;
+    add_times(status);
+    totals_.pairs += status.pairs;
+    totals_.missed += status.pairs_missed;
+    totals_.wall_pairs += status.wall_pairs;
+    totals_.wall_missed += status.wall_pairs_missed;
+    return status_of(status);
+  }
+
+  void read(std::vector<float>& position, std::vector<float>& velocity) const override {
+    scene_.read(position, velocity);
+  }
+
+  StageTimes stage_times() const override { return times_; }
+  std::int64_t rebuilds() const override { return rebuilds_; }
+  PairTotals pair_totals() const override { return totals_; }
+  std::size_t device_bytes() const override { return scene_.bytes() + search_.bytes(); }
+
+ private:
+  // Substeps of the long graph: launching it is then cheap beside running it.
+  static constexpr int long_graph_substeps = 16;
+
+  /// What an advance left, as it left it: nothing to rely on; lists, counts and walls; the same, with walls placed
+  /// for densities and not yet for forces.
+  enum class Structures { none, all, walls_for_density };
+
+  /// What a substep has to know beyond the arrays.
+  struct SubstepContext {
+    bool timed = false;
+    Branch rebuild, next_rebuild;  // of this substep and of the one after it in a graph
+  };
+
+  const Constants& c() const { return scene_.constants(); }
+  void require_loaded() const {
+    if (!loaded_) throw BackendError("nothing is loaded");
+  }
+  ParticleArrays arrays() {
+    ParticleArrays a = scene_.arrays();
+    search_.arrange(a);
+    return a;
+  }
+  void upload_poses(const std::vector<DevicePose>& poses) {
+    if (!scene_.upload_poses(poses)) return;
+    long_graph_.clear();
+    short_graph_.clear();
+  }
+
+  /// One substep: neighbors, density and pressure, forces, motion.
+  template <bool periodic>
+  void substep(const SubstepContext& context) {
+    const ParticleArrays a = arrays();
+    if (context.timed) timer_.start(stream_);
+    find_neighbors<periodic>(a, context.rebuild);
+    lap(context, times_.build);
+    compute_density<periodic>(a, {});
+    lap(context, times_.density);
+    compute_force<periodic>(a, {});
+    lap(context, times_.force);
+    integrate<periodic>(a, context.next_rebuild);
+    lap(context, times_.integrate);
+  }
+  /// The same kernels, but for the motion, and what they found.
+  template <bool periodic>
+  void compute_fields(const GivenInputs& given, const OutputArrays& out) {
+    const ParticleArrays a = arrays();
+    find_neighbors<periodic>(a, {});
+    compute_density<periodic>(a, out);
+    if (!given.density.empty()) use_given_density(a, given, out.pressure);
+    compute_force<periodic>(a, out);
+    compute_diagnostics<periodic>(a, out);
+    search_.restore_state(stream_, a);
+  }
+
+  template <bool periodic>
+  void find_neighbors(const ParticleArrays& a, Branch rebuild) {
+    const NamedRange range("find neighbors");
+    search_.template find_neighbors<periodic>(stream_, a, scene_.geometry(), rebuild);
+  }
+  template <bool periodic>
+  void compute_density(const ParticleArrays& a, const OutputArrays& out) {
+    const NamedRange range("density");
+    search_.template with_neighbors<periodic>(a, [&](auto team, const auto& neighbors) {
+      using Team = typename decltype(team)::type;
+      using Neighbors = std::decay_t<decltype(neighbors)>;
+      static_assert(NeighborRange<Neighbors, Team>);
+      stream_.template launch_teams<Team>(density_kernel<Team, Neighbors>, a.n,
+                                          Density<Neighbors>{c(), a, neighbors, out});
+    });
+  }
+  template <bool periodic>
+  void compute_force(const ParticleArrays& a, const OutputArrays& out) {
+    const NamedRange range("force");
+    search_.template with_neighbors<periodic>(a, [&](auto team, const auto& neighbors) {
+      using Team = typename decltype(team)::type;
+      using Neighbors = std::decay_t<decltype(neighbors)>;
+      stream_.template launch_teams<Team>(force_kernel<Team, Neighbors>, a.n,
+                                          Force<Neighbors, StoreAcceleration>{c(), a, neighbors, {a, out}});
+    });
+  }
+  template <bool periodic>
+  void integrate(const ParticleArrays& a, Branch next_rebuild) {
+    const NamedRange range("integrate");
+    search_.template integrate<periodic>(stream_, a, scene_.geometry(), next_rebuild);
+  }
+  template <bool periodic>
+  void compute_diagnostics(const ParticleArrays& a, const OutputArrays& out) {
+    const NamedRange range("diagnostics");
+    search_.template with_neighbors_of_one_thread<periodic>(a, [&](auto team, const auto& neighbors) {
+      using Team = typename decltype(team)::type;
+      using Neighbors = std::decay_t<decltype(neighbors)>;
+      stream_.template launch_teams<Team>(neighbor_counts_kernel<Team, Neighbors>, a.n,
+                                          NeighborCounts<Neighbors>{c(), a, neighbors, out, scene_.walls().walls.id});
+      stream_.template launch_teams<Team>(force_parts_kernel<Team, Neighbors>, a.n,
+                                          ForceParts<Neighbors>{c(), a, neighbors, out});
+    });
+  }
+  void use_given_density(const ParticleArrays& a, const GivenInputs& given, float* own_pressure) {
+    Buffer<float> density(given.density.size()), pressure(given.pressure.size());
+    density.upload(given.density);
+    pressure.upload(given.pressure);
+    stream_.launch(
+        use_given_density_kernel, a.n,
+        UseGivenDensity{c(), a, density.get(), given.pressure.empty() ? nullptr : pressure.get(), own_pressure});
+    stream_.wait();  // the two buffers end here
+  }
+
+  /// No substep yet, nothing found, walls in place, and neighbors to be looked for.
+  void begin() {
+    DeviceStatus status{};
+    status.non_finite = status.escaped = status.missed_pair = DeviceStatus::none;
+    status.rebuild_needed = 1;
+    scene_.set_status(status);
+    const ParticleArrays a = arrays();
+    stream_.launch(place_walls_kernel<WallsFor::both>, scene_.walls().padded_total(),
+                   PlaceWalls<WallsFor::both>{a, scene_.walls().walls, 0});
+    search_.begin(stream_, a);
+  }
+
+  /// For fields of what the next substep of an advance would use: only what that one would do first is done.
+  void resume() {
+    DeviceStatus status = scene_.status();
+    status.non_finite = status.escaped = status.missed_pair = DeviceStatus::none;
+    status.substeps_begun = status.substeps_ended = 0;
+    scene_.set_status(status);
+    if (in_use_ == Structures::walls_for_density)
+      stream_.launch(place_walls_kernel<WallsFor::force>, scene_.walls().moving_count(),
+                     scene_.walls().template moving<WallsFor::force>(arrays()));
+  }
+
+  /// All at once where the search can; else graph by graph. Now and then the first substep is timed stage by
+  /// stage and so is the second, which shares a list with the first, but never of the first advance after a load:
+  /// what is compared with the oracle is what runs.
+  Structures run(int substeps) {
+    Structures left = Structures::all;
+    with_periodic(c(), [&](auto periodic) {
+      constexpr bool p = decltype(periodic)::value;
+      if (search_.template advance<p>(stream_, arrays(), scene_.geometry(), substeps))
+        left = Structures::walls_for_density;
+      else this->template run_substeps<p>(substeps);
+    });
+    return left;
+  }
+  template <bool periodic>
+  void run_substeps(int substeps) {
+    int done = 0;
+    const int sample = advances_++ % 8 == 1 ? 2 : 0;
+    const int timed = search_.capturable() ? std::min(substeps, sample) : substeps;
+    for (; done < timed; ++done) {
+      substep<periodic>({true, {}, {}});
+      // Events are many; reading them now and then keeps their number small.
+      if (done % 64 == 63) timer_.read();
+    }
+    if (substeps - done >= long_graph_substeps && !long_graph_.captured())
+      long_graph_.capture(stream_, [this] {
+        Branch rebuild{};
+        for (int k = 0; k < long_graph_substeps; ++k) {
+          const bool decides = Search::rebuilds_on_demand && k + 1 < long_graph_substeps;
+          const Branch next = decides ? stream_.new_branch() : Branch{};
+          this->template substep<periodic>({false, rebuild, next});
+          rebuild = next;
+        }
+      });
+    for (; substeps - done >= long_graph_substeps; done += long_graph_substeps) long_graph_.launch(stream_);
+    if (substeps > done && !short_graph_.captured())
+      short_graph_.capture(stream_, [this] { this->template substep<periodic>({}); });
+    for (; done < substeps; ++done) short_graph_.launch(stream_);
+  }
+
+  void lap(const SubstepContext& context, StageTimes::Stage& stage) {
+    if (context.timed) timer_.lap(stream_, stage);
+  }
+  /// Of substeps that kept their own time.
+  void add_times(const DeviceStatus& status) {
+    const auto add = [&](StageTimes::Stage& stage, int k, int calls) {
+      if (status.stage_ns[k] <= 0) return;
+      stage.seconds += 1e-9 * static_cast<double>(status.stage_ns[k]);
+      stage.calls += calls;
+    };
+    const int substeps = static_cast<int>(status.substeps_ended);
+    add(times_.build, 0, status.rebuilds);
+    add(times_.density, 1, substeps);
+    add(times_.force, 2, substeps);
+  }
+
+  /// Whether lists were too short and have grown. Graphs know where the lists were.
+  bool grow(const DeviceStatus& status) {
+    if (status.longest_list == 0 || !search_.grow(status.longest_list)) return false;
+    long_graph_.clear();
+    short_graph_.clear();
+    return true;
+  }
+
+  static Status status_of(const DeviceStatus& from) {
+    Status status;
+    const unsigned long long first = std::min({from.non_finite, from.escaped, from.missed_pair});
+    if (from.non_finite != DeviceStatus::none) status.bits |= Status::non_finite;
+    if (from.escaped != DeviceStatus::none) status.bits |= Status::escaped;
+    if (from.missed_pair != DeviceStatus::none) status.bits |= Status::missed_pair;
+    // Nobody grew what was too short: whatever came out of it is not to be used.
+    if (from.longest_list != 0) status.bits |= Status::capacity;
+    if (first != DeviceStatus::none) {
+      status.particle = static_cast<std::int64_t>(first & 0xFFFFFFFFull);
+      status.substep = static_cast<std::int64_t>(first >> 32);
+    }
+    return status;
+  }
+
+  Stream stream_;
+  Search search_;
+  SceneArrays scene_;
+  OutputBuffers output_;
+  bool loaded_ = false;
+  Structures in_use_ = Structures::none;
+  std::int64_t rebuilds_ = 0, advances_ = 0;
+  PairTotals totals_;
+  StageTimes times_;
+  StageTimer timer_;
+  Graph long_graph_, short_graph_;
+};
+
+}  // namespace
+}  // namespace decant::gpu
