@@ -7,6 +7,8 @@
 #include "reference/scene.hpp"
 #include "reference/state.hpp"
 
+#include <tbb/parallel_invoke.h>
+
 #include <functional>
 #include <optional>
 
@@ -75,18 +77,23 @@ class DeviceBackend : public Backend {
     if (given) inputs = {values_of(given->boundary_volume), values_of(given->density), values_of(given->pressure)};
     gpu::HostFields fields;
     Status status = solver_->evaluate(gpu::make_poses(scene(), substep_, 1), inputs, fields);
-    out.boundary_volume = vector_of(fields.boundary_volume);
-    out.density = vector_of(fields.density);
-    out.pressure = vector_of(fields.pressure);
-    out.pressure_acceleration = matrix_of(fields.pressure_acceleration);
-    out.viscous_acceleration = matrix_of(fields.viscous_acceleration);
-    out.wall_pressure_acceleration = matrix_of(fields.wall_pressure_acceleration);
-    out.wall_viscous_acceleration = matrix_of(fields.wall_viscous_acceleration);
-    out.acceleration = matrix_of(fields.acceleration);
-    out.fluid_neighbor_count = ids_of(fields.fluid_count);
-    out.fluid_neighbor_id_sum = ids_of(fields.fluid_id_sum);
-    out.wall_neighbor_count = ids_of(fields.wall_count);
-    out.wall_neighbor_id_sum = ids_of(fields.wall_id_sum);
+    // As many values as a frame file holds: side by side, since a pour asks for them at every frame.
+    tbb::parallel_invoke([&] { out.boundary_volume = vector_of(fields.boundary_volume); },
+                         [&] {
+                           out.density = vector_of(fields.density);
+                           out.pressure = vector_of(fields.pressure);
+                         },
+                         [&] { out.pressure_acceleration = matrix_of(fields.pressure_acceleration); },
+                         [&] { out.viscous_acceleration = matrix_of(fields.viscous_acceleration); },
+                         [&] { out.wall_pressure_acceleration = matrix_of(fields.wall_pressure_acceleration); },
+                         [&] { out.wall_viscous_acceleration = matrix_of(fields.wall_viscous_acceleration); },
+                         [&] { out.acceleration = matrix_of(fields.acceleration); },
+                         [&] {
+                           out.fluid_neighbor_count = ids_of(fields.fluid_count);
+                           out.fluid_neighbor_id_sum = ids_of(fields.fluid_id_sum);
+                           out.wall_neighbor_count = ids_of(fields.wall_count);
+                           out.wall_neighbor_id_sum = ids_of(fields.wall_id_sum);
+                         });
     if (out.fluid_neighbor_count.size() > 0) {
       stats_.mean_fluid = out.fluid_neighbor_count.cast<double>().mean();
       stats_.mean_wall = out.wall_neighbor_count.cast<double>().mean();
@@ -106,8 +113,7 @@ class DeviceBackend : public Backend {
     std::vector<float> position, velocity;
     solver_->read(position, velocity);
     out.substep = substep_;
-    out.position = matrix_of(position);
-    out.velocity = matrix_of(velocity);
+    tbb::parallel_invoke([&] { out.position = matrix_of(position); }, [&] { out.velocity = matrix_of(velocity); });
   }
 
   StageTimes stage_times() const override { return solver_->stage_times(); }
