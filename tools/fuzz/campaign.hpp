@@ -100,7 +100,7 @@ struct Settings {
   int threads = 1;
   int most_counterexamples = 16;  // a campaign stops here
   int minimise_tries = 2000;
-  double minimise_seconds = 20;  // of each counterexample
+  double minimise_seconds = 20;    // of each counterexample
   std::filesystem::path failures;  // folder for fixtures of counterexamples; empty: none are written
   std::function<bool()> stop;
   std::function<void(const struct Campaign&)> progress;  // now and then, from one thread at a time
