@@ -23,6 +23,7 @@ class AllParticles {
   explicit AllParticles(const SolverOptions&) {}
 
   static constexpr bool stores_square = RangeOf<false>::stores_square, rebuilds_on_demand = false;
+  static_assert(RangeOf<true>::stores_square == stores_square);
 
   void load(Stream& stream, const Constants& c, const ParticleArrays& a, const WallStore& walls, const Box&) {
     c_ = c;
