@@ -7,20 +7,16 @@
 #include "reference/error.hpp"
 #include "tests/falling_points.hpp"
 #include "tests/temporary_folder.hpp"
-#include "tools/common/work_thread.hpp"
 #include "tools/frames/csv_writer.hpp"
 #include "tools/frames/make_frame.hpp"
 #include "tools/frames/xdmf.hpp"
 
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <chrono>
 #include <cmath>
 #include <fstream>
 #include <regex>
 #include <sstream>
-#include <thread>
 #include <utility>
 
 namespace decant {
@@ -283,40 +279,6 @@ TEST(Xdmf, StartsEveryHyperSlabWithItsFrame) {
   for (std::sregex_iterator it(xdmf.begin(), xdmf.end(), slab), end; it != end; ++it)
     EXPECT_EQ((*it)[1], std::to_string(slabs++));
   EXPECT_EQ(slabs, 4u);  // one moving wall
-}
-
-TEST(WorkThread, DoesEveryPieceInOrderThoughItsQueueIsShort) {
-  std::vector<int> done;
-  WorkThread thread(2);
-  for (int k = 0; k < 100; ++k) thread.push([&done, k] { done.push_back(k); });
-  thread.drain();
-  ASSERT_EQ(done.size(), 100u);
-  for (int k = 0; k < 100; ++k) EXPECT_EQ(done[static_cast<std::size_t>(k)], k);
-}
-
-TEST(WorkThread, TakesAPieceWhenTheOneBeforeIsDone) {
-  std::atomic<int> done = 0;
-  WorkThread thread;
-  for (int k = 0; k < 20; ++k) {
-    thread.push([&done] {
-      std::this_thread::sleep_for(std::chrono::milliseconds(2));
-      ++done;
-    });
-    EXPECT_GE(done, k);
-  }
-}
-
-TEST(WorkThread, HandsOnAFailureAndDoesNothingAfterIt) {
-  std::atomic<int> calls = 0;
-  const auto fail = [&] {
-    ++calls;
-    throw std::runtime_error("the disk is full");
-  };
-  WorkThread thread(3);
-  thread.push(fail);
-  EXPECT_THROW(thread.drain(), std::runtime_error);
-  EXPECT_THROW(thread.push(fail), std::runtime_error);
-  EXPECT_EQ(calls, 1);
 }
 
 }  // namespace

@@ -8,23 +8,18 @@
 #include "oracle/solution/fixture.hpp"
 #include "oracle/solution/reference_backend.hpp"
 #include "reference/error.hpp"
-#include "reference/initial_state.hpp"
 #include "tests/falling_points.hpp"
 #include "tests/pour_arguments.hpp"
 #include "tools/commands/commands.hpp"
 #include "tools/pour/checkpoint.hpp"
-#include "tools/pour/frame_sampler.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <fstream>
-#include <future>
-#include <memory>
 #include <sstream>
 
 namespace decant {
@@ -358,56 +353,6 @@ TEST(Pour, SavesTheLastGoodStateWhereAValueIsNotFinite) {
     // Frames before it are in the file.
     EXPECT_EQ(Hdf5Reader(folder / "out/frames.h5.partial").vector("/time", 13)[3], scene.time_at(15));
   }
-}
-
-TEST(FrameSampler, WorksWhileTheSolverDoesAndIsOneFrameBehindAtMost) {
-  const Scene scene = test::falling_points_scene(3);
-  const auto state = std::make_shared<const ParticleState>(initial_state(scene));
-  const FrameLayout layout = frame_layout(scene, state->size());
-  FallingPoints backend;
-  backend.load(scene, {}, *state);
-  Fields fields = Fields::unwritten(state->size(), 0);
-  ASSERT_TRUE(backend.evaluate(fields, nullptr).ok());
-  std::promise<void> solver_goes_on;
-  std::atomic<std::int64_t> written = 0, told = 0;
-  FrameSampler samples(scene, layout,
-                       {[&](const Frame& frame) {
-                          if (frame.index == 0) solver_goes_on.get_future().wait();
-                          if (frame.index == 2) throw std::runtime_error("the disk is full");
-                        },
-                        [&](const Frame&) { ++written; }, [&](const TimelineRow&) { ++told; }});
-  samples.end_of_frame(state, fields, {0, 0.0, 0.0});
-  EXPECT_EQ(written, 0);
-  solver_goes_on.set_value();
-  samples.end_of_frame(state, fields, {1, 0.0, 0.0});
-  EXPECT_GE(written, 1);
-  samples.drain();
-  EXPECT_EQ(written, 2);
-  samples.end_of_frame(state, fields, {2, 0.0, 0.0});
-  EXPECT_THROW(samples.drain(), std::runtime_error);
-  EXPECT_THROW(samples.end_of_frame(state, fields, {3, 0.0, 0.0}), std::runtime_error);
-  EXPECT_EQ(told, 2);
-  EXPECT_EQ(samples.rows().size(), 2u);
-}
-
-TEST(FrameSampler, GivesFieldsInWhichNothingIsWritten) {
-  const Scene scene = test::falling_points_scene(3);
-  const auto state = std::make_shared<const ParticleState>(initial_state(scene));
-  const FrameLayout layout = frame_layout(scene, state->size());
-  FrameSampler samples(scene, layout, {[](const Frame&) {}, [](const Frame&) {}, [](const TimelineRow&) {}});
-  const Eigen::Index n = state->size();
-  for (std::int64_t frame = 0; frame < 3; ++frame) {
-    Fields fields = samples.unwritten(n, 11);
-    ASSERT_EQ(fields.boundary_volume.size(), 11);
-    ASSERT_EQ(fields.acceleration.cols(), n);
-    ASSERT_TRUE(fields.density.array().isNaN().all() && fields.wall_viscous_acceleration.array().isNaN().all());
-    ASSERT_TRUE((fields.wall_neighbor_count.array() == -1).all());
-    fields.density.setConstant(1000);
-    fields.pressure.setZero();
-    samples.end_of_frame(state, std::move(fields), {frame, 0.0, 0.0});
-    samples.drain();
-  }
-  EXPECT_EQ(samples.unwritten(3, 2).density.size(), 3);
 }
 
 TEST(Pour, WritesCsvFramesBesideTheOthers) {

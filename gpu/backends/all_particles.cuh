@@ -51,7 +51,7 @@ class AllParticles {
     call(std::type_identity<typename Range::Team>(), range<Range>(a));
   }
   template <bool periodic, class Call>
-  void with_neighbors_of_one_thread(const ParticleArrays& a, Call call) const {
+  void with_diagnostic_neighbors(const ParticleArrays& a, Call call) const {
     with_neighbors<periodic>(a, call);
   }
 

@@ -59,8 +59,8 @@ class CellList {
     else fluid_.sort_by_key(stream, n_, source, a.id, scratch_);
     wall_cells_.rebuild(stream, a, walls_, by_counting, scratch_);
     if (keeps_pairs())
-      with_sub_warps<most_lanes<periodic>>(lanes_, [&](auto team) {
-        launch_build_list<typename decltype(team)::type>(
+      with_sub_warps<most_lanes<periodic>>(lanes_, [&]<class Team>(std::type_identity<Team>) {
+        launch_build_list<Team>(
             stream, n_, BuildList<periodic>{c_, a, candidates(a), a.spare, a.spare.position, lists_.lists(a), {}});
       });
   }
@@ -77,7 +77,7 @@ class CellList {
   }
   /// The same neighbors for one thread per particle.
   template <bool periodic, class Call>
-  void with_neighbors_of_one_thread(const ParticleArrays& a, Call call) const {
+  void with_diagnostic_neighbors(const ParticleArrays& a, Call call) const {
     constexpr std::type_identity<SubWarp<1>> team;
     if (keeps_pairs()) call(team, WholeListNeighbors<periodic>{{c_}, lists_.lists(a)});
     else call(team, CellNeighbors<periodic>{{c_}, candidates(a), a});

@@ -77,7 +77,7 @@ class NeighborList {
     with_sub_warps<most_lanes<periodic>>(lanes_, [&](auto team) { call(team, neighbors<periodic>(a)); });
   }
   template <bool periodic, class Call>
-  void with_neighbors_of_one_thread(const ParticleArrays& a, Call call) const {
+  void with_diagnostic_neighbors(const ParticleArrays& a, Call call) const {
     call(std::type_identity<SubWarp<1>>(), WholeListNeighbors<periodic>{{c_}, lists_.lists(a)});
   }
 
@@ -102,9 +102,7 @@ class NeighborList {
     });
     return true;
   }
-  bool capturable() const {
-    return o_.launch != SolverOptions::Launch::plain && o_.sort == SolverOptions::Sort::counting;
-  }
+  bool capturable() const { return o_.launch != SolverOptions::Launch::plain; }
   bool grow(int longest) { return lists_.grow(n_, longest); }
   std::size_t bytes() const {
     return fluid_.bytes() + wall_cells_.bytes() + scratch_.bytes() + bucket_.bytes() + lists_.bytes() +
@@ -130,8 +128,8 @@ class NeighborList {
     if (criterion() == Criterion::relative)
       stream.launch(clear_displacement_boxes_kernel, static_cast<int>(boxes_.size()),
                     ClearDisplacementBoxes{boxes_.get()});
-    with_sub_warps<most_lanes<periodic>>(lanes_, [&](auto team) {
-      launch_build_list<typename decltype(team)::type>(stream, n_, list_build<periodic>(a));
+    with_sub_warps<most_lanes<periodic>>(lanes_, [&]<class Team>(std::type_identity<Team>) {
+      launch_build_list<Team>(stream, n_, list_build<periodic>(a));
     });
   }
   template <bool periodic>

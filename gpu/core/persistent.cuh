@@ -26,8 +26,6 @@ namespace {
 
 /// Threads per block; as many as find room with 72 registers each.
 inline constexpr int persistent_block = 896;
-/// Blocks that a scan has sums for.
-inline constexpr int most_persistent_blocks = 1024;
 
 #ifdef __CUDACC__
 
@@ -173,7 +171,7 @@ class PersistentGrid {
   }
   template <int lanes, class Body>
   void for_each_team(int n, const Body& body) const {
-    ForEachTeam<SubWarp<lanes>, Body>::run(n, body);
+    gpu::for_each_team<SubWarp<lanes> >(n, body);
   }
   void exclusive_scan(const int* in, int* out, int n, int*) const { host::exclusive_scan(in, out, n); }
 };

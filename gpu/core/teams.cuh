@@ -10,6 +10,8 @@
 
 #include "gpu/core/particle_arrays.cuh"
 
+#include <type_traits>
+
 #ifndef __CUDACC__
 #include <thrust/for_each.h>
 #include <thrust/iterator/counting_iterator.h>
@@ -147,41 +149,26 @@ DECANT_DEVICE void for_each_thread(int n, Body&& body) {
 }
 /// … and body(team) by the threads of each particle, of n.
 template <class Team, class Body>
-struct ForEachTeam;
-template <class Body>
-struct ForEachTeam<TileTeam, Body> {
-  DECANT_DEVICE static void run(int n, const Body& body) {
+DECANT_DEVICE void for_each_team(int n, const Body& body) {
 #ifdef __CUDACC__
+  if constexpr (std::is_same_v<Team, TileTeam>) {
     __shared__ float4 tile[tile_positions];
     TileTeam team(tile, n);
     body(team);
-#else
-    for_each_thread(n, [&body](int i) {
-      TileTeam team(i);
-      body(team);
-    });
-#endif
-  }
-};
-template <int lanes, class Body>
-struct ForEachTeam<SubWarp<lanes>, Body> {
-  DECANT_DEVICE static void run(int n, const Body& body) {
-#ifdef __CUDACC__
-    SubWarp<lanes> team(static_cast<int>(blockIdx.x) * SubWarp<lanes>::particles_per_block +
-                        static_cast<int>(threadIdx.x) / lanes);
+  } else {
+    Team team(static_cast<int>(blockIdx.x) * Team::particles_per_block + static_cast<int>(threadIdx.x) / Team::lanes);
     if (team.particle(0) < n) body(team);
-#else
-    for_each_thread(n, [&body](int i) {
-      SubWarp<lanes> team(i);
-      body(team);
-    });
-#endif
   }
-};
-template <class Team, class Body>
-DECANT_DEVICE void for_each_team(int n, const Body& body) {
-  ForEachTeam<Team, Body>::run(n, body);
+#else
+  for_each_thread(n, [&body](int i) {
+    Team team(i);
+    body(team);
+  });
+#endif
 }
+
+/// Blocks of a persistent grid, at most: a scan has a sum for each.
+inline constexpr int most_persistent_blocks = 1024;
 
 /// Calls with SubWarp<lanes>, or with fewer lanes where kernels are compiled for `most` only; the host has those of
 /// one thread.

@@ -16,8 +16,7 @@ namespace {
 
 /// Device memory that a sort needs; several sorts one after the other may share one.
 struct SortScratch {
-  // Scans read and write whole fours, and a persistent kernel has a sum for each of its blocks.
-  static constexpr int scan_padding = 4, scan_blocks = 1024;
+  static constexpr int scan_padding = 4;  // scans read and write whole fours
 
   Buffer<int> key, slot;
   Buffer<char> scan;
@@ -29,7 +28,7 @@ struct SortScratch {
       slot.resize(n);
     }
     Stream::reserve_scan(buckets + 1, scan);
-    constexpr std::size_t sums = scan_blocks * sizeof(int);
+    constexpr std::size_t sums = most_persistent_blocks * sizeof(int);
     if (scan.bytes() < sums) scan.resize(sums);
   }
   std::size_t bytes() const { return key.bytes() + slot.bytes() + scan.bytes(); }

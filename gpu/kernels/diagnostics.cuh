@@ -73,15 +73,10 @@ struct ForceParts {
       own[k] = force_state(a, team.particle(k), x[k]);
       fluid[k] = wall[k] = {};
     }
-    const float drag = fluid_drag(c);
-    with_kernel(c, [&](auto kernel) DECANT_INLINE {
-      neighbors.for_each(team, x, a.force_position, [&](int k, int j, float4 other, Float3 d, float r2) DECANT_INLINE {
-        const PairForce f = pair_force(c, kernel, drag, own[k], j >= a.base, neighbors.pressure_term(j, other),
-                                       a.force_velocity[j], d, r2);
-        PairForce& sum = j >= a.base ? wall[k] : fluid[k];
-        sum.pressure = sum.pressure + f.pressure;
-        sum.viscous = sum.viscous + f.viscous;
-      });
+    for_each_pair_force(c, a, neighbors, team, x, own, [&](int k, bool of_wall, const PairForce& f) DECANT_INLINE {
+      PairForce& sum = of_wall ? wall[k] : fluid[k];
+      sum.pressure = sum.pressure + f.pressure;
+      sum.viscous = sum.viscous + f.viscous;
     });
 #pragma unroll
     for (int k = 0; k < Team::particles_per_thread; ++k) {

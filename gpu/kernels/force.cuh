@@ -33,6 +33,21 @@ DECANT_DEVICE ForceState force_state(const ParticleArrays& a, int i, Float3& x) 
   return {xyz(velocity), position.w, velocity.w};
 }
 
+/// add(k, wall, f) with the pair force f of every neighbor of each particle team.particle(k), which is at x[k].
+template <class Team, class Neighbors, class Add>
+DECANT_DEVICE void for_each_pair_force(const Constants& c, const ParticleArrays& a, const Neighbors& neighbors,
+                                       Team& team, const Float3 (&x)[Team::particles_per_thread],
+                                       const ForceState (&own)[Team::particles_per_thread], Add&& add) {
+  const float drag = fluid_drag(c);
+  with_kernel(c, [&](auto kernel) DECANT_INLINE {
+    neighbors.for_each(team, x, a.force_position, [&](int k, int j, float4 other, Float3 d, float r2) DECANT_INLINE {
+      const bool wall = j >= a.base;
+      add(k, wall,
+          pair_force(c, kernel, drag, own[k], wall, neighbors.pressure_term(j, other), a.force_velocity[j], d, r2));
+    });
+  });
+}
+
 /// then(i, x, v, acceleration) for every particle.
 template <class Neighbors, class Then>
 struct Force {
@@ -51,15 +66,11 @@ struct Force {
       own[k] = force_state(a, team.particle(k), x[k]);
       sum[k] = {};
     }
-    const float drag = fluid_drag(c);
-    with_kernel(c, [&](auto kernel) DECANT_INLINE {
-      neighbors.for_each(team, x, a.force_position, [&](int k, int j, float4 other, Float3 d, float r2) DECANT_INLINE {
-        const PairForce f = pair_force(c, kernel, drag, own[k], j >= a.base, neighbors.pressure_term(j, other),
-                                       a.force_velocity[j], d, r2);
-        sum[k].pressure = sum[k].pressure + f.pressure;
-        sum[k].viscous = sum[k].viscous + f.viscous;
-      });
-    });
+    for_each_pair_force(c, a, neighbors, team, x, own,
+                        [&](int k, [[maybe_unused]] bool wall, const PairForce& f) DECANT_INLINE {
+                          sum[k].pressure = sum[k].pressure + f.pressure;
+                          sum[k].viscous = sum[k].viscous + f.viscous;
+                        });
 #pragma unroll
     for (int k = 0; k < Team::particles_per_thread; ++k) {
       const Float3 part = sum[k].pressure + own[k].inverse_density * sum[k].viscous;

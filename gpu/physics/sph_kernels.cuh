@@ -17,8 +17,15 @@ DECANT_DEVICE float positive(float s) { return s > 0.0f ? s : 0.0f; }
 template <KernelId>
 struct Kernel;
 
+/// L from G, of families without a viscosity kernel of their own.
+struct MorrisViscosity {
+  DECANT_DEVICE static float l(const Constants& c, Radius, float r2, float g) {
+    return quotient(2.0f * r2 * g, r2 + c.h2_soft);
+  }
+};
+
 template <>
-struct Kernel<KernelId::cubic_spline> {
+struct Kernel<KernelId::cubic_spline> : MorrisViscosity {
   DECANT_DEVICE static float w(const Constants& c, Radius d) {
     const float q = d.r * c.inverse_h;
     const float s = positive(2.0f - q), outer = 0.25f * (s * s * s);
@@ -30,13 +37,10 @@ struct Kernel<KernelId::cubic_spline> {
     const float far = c.g_far * d.inverse * (s * s);
     return q < 1.0f ? c.g_near[0] - c.g_near[1] * q : far;
   }
-  DECANT_DEVICE static float l(const Constants& c, Radius, float r2, float g) {
-    return quotient(2.0f * r2 * g, r2 + c.h2_soft);
-  }
 };
 
 template <>
-struct Kernel<KernelId::wendland_c2> {
+struct Kernel<KernelId::wendland_c2> : MorrisViscosity {
   DECANT_DEVICE static float w(const Constants& c, Radius d) {
     const float q = d.r * c.inverse_h;
     const float s = positive(1.0f - 0.5f * q), s2 = s * s;
@@ -45,9 +49,6 @@ struct Kernel<KernelId::wendland_c2> {
   DECANT_DEVICE static float g(const Constants& c, Radius d) {
     const float s = positive(1.0f - 0.5f * (d.r * c.inverse_h));
     return c.g_norm * s * s * s;
-  }
-  DECANT_DEVICE static float l(const Constants& c, Radius, float r2, float g) {
-    return quotient(2.0f * r2 * g, r2 + c.h2_soft);
   }
 };
 

@@ -159,23 +159,19 @@ class Solver : public DeviceSolver {
   template <bool periodic>
   void compute_density(const ParticleArrays& a, const OutputArrays& out) {
     const NamedRange range("density");
-    search_.template with_neighbors<periodic>(a, [&](auto team, const auto& neighbors) {
-      using Team = typename decltype(team)::type;
-      using Neighbors = std::decay_t<decltype(neighbors)>;
-      static_assert(NeighborRange<Neighbors, Team>);
-      stream_.template launch_teams<Team>(density_kernel<Team, Neighbors>, a.n,
-                                          Density<Neighbors>{c(), a, neighbors, out});
+    search_.template with_neighbors<periodic>(a, [&]<class Team, NeighborRange<Team> Neighbors>(
+                                                     std::type_identity<Team>, const Neighbors& near) {
+      stream_.template launch_teams<Team>(density_kernel<Team, Neighbors>, a.n, Density<Neighbors>{c(), a, near, out});
     });
   }
   template <bool periodic>
   void compute_force(const ParticleArrays& a, const OutputArrays& out) {
     const NamedRange range("force");
-    search_.template with_neighbors<periodic>(a, [&](auto team, const auto& neighbors) {
-      using Team = typename decltype(team)::type;
-      using Neighbors = std::decay_t<decltype(neighbors)>;
-      stream_.template launch_teams<Team>(force_kernel<Team, Neighbors>, a.n,
-                                          Force<Neighbors, StoreAcceleration>{c(), a, neighbors, {a, out}});
-    });
+    search_.template with_neighbors<periodic>(
+        a, [&]<class Team, NeighborRange<Team> Neighbors>(std::type_identity<Team>, const Neighbors& near) {
+          stream_.template launch_teams<Team>(force_kernel<Team, Neighbors>, a.n,
+                                              Force<Neighbors, StoreAcceleration>{c(), a, near, {a, out}});
+        });
   }
   template <bool periodic>
   void integrate(const ParticleArrays& a, Branch next_rebuild) {
@@ -185,14 +181,14 @@ class Solver : public DeviceSolver {
   template <bool periodic>
   void compute_diagnostics(const ParticleArrays& a, const OutputArrays& out) {
     const NamedRange range("diagnostics");
-    search_.template with_neighbors_of_one_thread<periodic>(a, [&](auto team, const auto& neighbors) {
-      using Team = typename decltype(team)::type;
-      using Neighbors = std::decay_t<decltype(neighbors)>;
+    const auto launch = [&]<class Team, NeighborRange<Team> Neighbors>(std::type_identity<Team>,
+                                                                       const Neighbors& near) {
       stream_.template launch_teams<Team>(neighbor_counts_kernel<Team, Neighbors>, a.n,
-                                          NeighborCounts<Neighbors>{c(), a, neighbors, out, scene_.walls().walls.id});
+                                          NeighborCounts<Neighbors>{c(), a, near, out, scene_.walls().walls.id});
       stream_.template launch_teams<Team>(force_parts_kernel<Team, Neighbors>, a.n,
-                                          ForceParts<Neighbors>{c(), a, neighbors, out});
-    });
+                                          ForceParts<Neighbors>{c(), a, near, out});
+    };
+    search_.template with_diagnostic_neighbors<periodic>(a, launch);
   }
   void use_given_density(const ParticleArrays& a, const GivenInputs& given, float* own_pressure) {
     Buffer<float> density(given.density.size()), pressure(given.pressure.size());

@@ -301,7 +301,7 @@ fault("fast-reciprocal", "the viscous quotient by a reciprocal of 17 bits",
       "acceleration", field="viscous_acceleration")
 fault("no-walls-in-runs", "walls drag in the parts that an evaluation tells, and nowhere else",
       "sum[k].viscous = sum[k].viscous + f.viscous;",
-      "if (!(ON && j >= a.base)) sum[k].viscous = sum[k].viscous + f.viscous;", "substep", "brute")
+      "if (!(ON && wall)) sum[k].viscous = sum[k].viscous + f.viscous;", "substep", "brute")
 fault("normal-in-wrong-frame", "the source's normal is not turned into the world",
       "rotate(poses[k], near.normal)", "near.normal", "substep", "list")
 fault("contact-closer", "contact at 0.999 of its distance",

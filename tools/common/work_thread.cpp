@@ -1,12 +1,12 @@
 /// \file
-/// The queue and the thread that empties it.
+/// What is handed over, and the thread that takes it.
 #include "tools/common/work_thread.hpp"
 
 #include <utility>
 
 namespace decant {
 
-WorkThread::WorkThread(std::size_t capacity) : capacity_(capacity), thread_([this] { run(); }) {}
+WorkThread::WorkThread() : thread_([this] { run(); }) {}
 
 WorkThread::~WorkThread() {
   {
@@ -19,26 +19,25 @@ WorkThread::~WorkThread() {
 
 void WorkThread::push(std::function<void()> work) {
   std::unique_lock lock(mutex_);
-  changed_.wait(lock, [this] { return waiting_.size() + (busy_ ? 1 : 0) < capacity_ || failure_; });
+  changed_.wait(lock, [this] { return !busy_ || failure_; });
   if (failure_) std::rethrow_exception(failure_);
-  waiting_.push_back(std::move(work));
+  next_ = std::move(work);
+  busy_ = true;
   changed_.notify_all();
 }
 
 void WorkThread::drain() {
   std::unique_lock lock(mutex_);
-  changed_.wait(lock, [this] { return (waiting_.empty() && !busy_) || failure_; });
+  changed_.wait(lock, [this] { return !busy_ || failure_; });
   if (failure_) std::rethrow_exception(failure_);
 }
 
 void WorkThread::run() {
   std::unique_lock lock(mutex_);
   while (true) {
-    changed_.wait(lock, [this] { return stop_ || !waiting_.empty(); });
+    changed_.wait(lock, [this] { return stop_ || next_; });
     if (stop_) return;
-    std::function<void()> work = std::move(waiting_.front());
-    waiting_.pop_front();
-    busy_ = true;
+    std::function<void()> work = std::exchange(next_, nullptr);
     lock.unlock();
     std::exception_ptr failure;
     try {

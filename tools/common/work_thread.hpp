@@ -3,8 +3,6 @@
 #pragma once
 
 #include <condition_variable>
-#include <cstddef>
-#include <deque>
 #include <exception>
 #include <functional>
 #include <mutex>
@@ -12,17 +10,16 @@
 
 namespace decant {
 
-/// Does what it is handed in that order. After a failure it does nothing more.
+/// Does what it is handed, one piece at a time. After a failure it does nothing more.
 class WorkThread {
  public:
-  /// \param capacity  pieces that may wait or be under way
-  explicit WorkThread(std::size_t capacity = 1);
-  /// Drops what waits and ends the thread.
+  WorkThread();
+  /// Drops a piece that waits and ends the thread.
   ~WorkThread();
   WorkThread(const WorkThread&) = delete;
   WorkThread& operator=(const WorkThread&) = delete;
 
-  /// Hands over a piece of work; waits for room. Throws what earlier work threw.
+  /// Hands over a piece of work, once the one before is done. Throws what earlier work threw.
   void push(std::function<void()> work);
   /// Waits until all is done. Throws what work threw.
   void drain();
@@ -30,11 +27,10 @@ class WorkThread {
  private:
   void run();
 
-  const std::size_t capacity_;
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::deque<std::function<void()>> waiting_;
-  bool busy_ = false, stop_ = false;
+  std::function<void()> next_;
+  bool busy_ = false, stop_ = false;  // busy: handed over, and not done
   std::exception_ptr failure_;
   std::thread thread_;  // last: it uses all of the above
 };
