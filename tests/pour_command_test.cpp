@@ -11,6 +11,7 @@
 #include "tests/falling_points.hpp"
 #include "tests/pour_arguments.hpp"
 #include "tools/commands/commands.hpp"
+#include "tools/frames/frame_file.hpp"
 #include "tools/pour/checkpoint.hpp"
 
 #include <fmt/format.h>
