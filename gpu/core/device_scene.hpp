@@ -52,7 +52,7 @@ struct Box {
 };
 
 /// Exposed rectangle of a box union; its outward normal is `side` along `axis`.
-struct Face {
+struct alignas(16) Face {
   Float3 min, max;
   int axis, side;
 };

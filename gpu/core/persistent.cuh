@@ -33,6 +33,11 @@ class PersistentGrid {
  public:
   DECANT_DEVICE void sync() const { cooperative_groups::this_grid().sync(); }
 
+  /// By one thread, of those that work is least likely to have reached.
+  template <class Body>
+  DECANT_DEVICE void once(const Body& body) const {
+    if (blockIdx.x + 1 == gridDim.x && threadIdx.x + 1 == blockDim.x) body();
+  }
   /// body(i) for i in 0 … n−1.
   template <class Body>
   DECANT_DEVICE void for_each(int n, const Body& body) const {
@@ -106,24 +111,36 @@ class PersistentGrid {
   }
 };
 
-/// Nanoseconds from one lap to the next, by one thread of all.
+/// Nanoseconds from one lap to the next, by one thread of all; `store` adds up what laps took.
 class PersistentTimer {
  public:
-  DECANT_DEVICE explicit PersistentTimer(long long* stage_ns) : stage_ns_(stage_ns), last_(now()) {}
+  DECANT_DEVICE PersistentTimer() : last_(now()) {
+    if (counts())
+      for (int k = 0; k < 3; ++k) sum(k) = 0;
+  }
   DECANT_DEVICE void lap(int stage) {
-    if (blockIdx.x != 0 || threadIdx.x != 0) return;
+    if (!counts()) return;
     const long long time = now();
-    stage_ns_[stage] += time - last_;
+    sum(stage) += time - last_;
     last_ = time;
+  }
+  DECANT_DEVICE void store(long long* stage_ns) const {
+    if (!counts()) return;
+    for (int k = 0; k < 3; ++k) stage_ns[k] += sum(k);
   }
 
  private:
+  DECANT_DEVICE static bool counts() { return blockIdx.x == 0 && threadIdx.x == 0; }
+  DECANT_DEVICE static long long& sum(int stage) {
+    __shared__ long long sums[3];  // a load and store of global memory would take a thread all others wait for longer
+    return sums[stage];
+  }
   DECANT_DEVICE static long long now() {
     long long ns;
     asm volatile("mov.u64 %0, %globaltimer;" : "=l"(ns));
     return ns;
   }
-  long long *stage_ns_, last_;
+  long long last_;
 };
 
 /// Blocks of a persistent grid that runs the kernel with so many bytes of shared memory per block, or 0 where
@@ -166,6 +183,10 @@ class PersistentGrid {
  public:
   void sync() const {}
   template <class Body>
+  void once(const Body& body) const {
+    body();
+  }
+  template <class Body>
   void for_each(int n, const Body& body) const {
     for_each_thread(n, body);
   }
@@ -178,16 +199,18 @@ class PersistentGrid {
 
 class PersistentTimer {
  public:
-  explicit PersistentTimer(long long* stage_ns) : stage_ns_(stage_ns) {}
   void lap(int stage) {
     const auto now = Clock::now();
-    stage_ns_[stage] += std::chrono::duration_cast<std::chrono::nanoseconds>(now - last_).count();
+    sum_[stage] += std::chrono::duration_cast<std::chrono::nanoseconds>(now - last_).count();
     last_ = now;
+  }
+  void store(long long* stage_ns) const {
+    for (int k = 0; k < 3; ++k) stage_ns[k] += sum_[k];
   }
 
  private:
   using Clock = std::chrono::steady_clock;
-  long long* stage_ns_;
+  long long sum_[3] = {0, 0, 0};
   Clock::time_point last_ = Clock::now();
 };
 

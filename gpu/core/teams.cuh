@@ -117,6 +117,18 @@ class SubWarp {
   }
   /// What its threads have written to shared memory is there for all of them.
   DECANT_DEVICE void sync() const { __syncwarp(mask()); }
+  /// The least value of all threads, and its number, of several the lowest; on each of them.
+  DECANT_DEVICE void find_least(float& value, int& number) const {
+#pragma unroll
+    for (int step = 1; step < lanes; step *= 2) {
+      const float other = __shfl_xor_sync(mask(), value, step);
+      const int other_number = __shfl_xor_sync(mask(), number, step);
+      if (other < value || (other == value && other_number < number)) {
+        value = other;
+        number = other_number;
+      }
+    }
+  }
 #else
   static_assert(lanes == 1, "the host runs one thread per particle");
   int lane() const { return 0; }
@@ -126,6 +138,7 @@ class SubWarp {
     return value;
   }
   void sync() const {}
+  void find_least(float&, int&) const {}
 #endif
 
  private:
@@ -135,6 +148,16 @@ class SubWarp {
 #endif
   int i_;
 };
+
+/// By one thread of a kernel.
+template <class Body>
+DECANT_DEVICE void once(const Body& body) {
+#ifdef __CUDACC__
+  if (blockIdx.x == 0 && threadIdx.x == 0) body();
+#else
+  body();
+#endif
+}
 
 /// Bodies of kernels: body(i) by the thread of i, for i in 0 … n−1 …
 template <class Body>

@@ -10,6 +10,21 @@
 namespace decant::gpu {
 namespace {
 
+/// Once per substep, beside the densities. In an evaluation, which has the poses of its time alone, nothing moves.
+struct BeginSubstep {
+  ParticleArrays a;
+  bool moves;
+
+  DECANT_DEVICE void operator()() const {
+    ++a.status->substeps_begun;
+    const DevicePose* poses = a.poses_after();
+    float step = 0.0f;
+    for (int k = 0; k < a.containers && moves; ++k) step = fmaxf(step, poses[k].step);
+    a.status->wall_step = step;
+    a.status->wall_displacement += step;
+  }
+};
+
 template <class Neighbors>
 struct Density {
   Constants c;
@@ -42,7 +57,6 @@ struct Density {
     const float density = team.sum(sum);
     if (!team.active(k) || !team.is_leader()) return;
     const int i = team.particle(k);
-    if (i == 0) begin_substep();
     const float p = pressure_at(c, density);
     const float4 v = a.current.velocity[i];
     a.force_position[i] = make_float4(x.x, x.y, x.z, p / (density * density));
@@ -52,20 +66,12 @@ struct Density {
     out.density[id] = density;
     out.pressure[id] = p;
   }
-  DECANT_DEVICE void begin_substep() const {
-    ++a.status->substeps_begun;
-    const DevicePose* poses = a.poses_after();
-    float step = 0.0f;
-    // An evaluation has the poses of its time alone, and nothing moves.
-    for (int k = 0; k < a.containers && !out.density; ++k) step = fmaxf(step, poses[k].step);
-    a.status->wall_step = step;
-    a.status->wall_displacement += step;
-  }
 };
 
 template <class Team, class Neighbors>
 DECANT_KERNEL(Team::block_size, Team::blocks_per_multiprocessor)
 density_kernel(int n, Density<Neighbors> density) {
+  once(BeginSubstep{density.a, !density.out.density});
   for_each_team<Team>(n, density);
 }
 

@@ -14,6 +14,7 @@ namespace {
 struct StoreAcceleration {
   ParticleArrays a;
   OutputArrays out;
+  static constexpr bool by_team = false;
 
   DECANT_DEVICE void operator()(int i, Float3 x, Float3, Float3 acceleration) const {
     if (!out.acceleration) {
@@ -48,7 +49,7 @@ DECANT_DEVICE void for_each_pair_force(const Constants& c, const ParticleArrays&
   });
 }
 
-/// then(i, x, v, acceleration) for every particle.
+/// then(i, x, v, acceleration) for every particle, or then(team, i, …) by all threads that work on it.
 template <class Neighbors, class Then>
 struct Force {
   Constants c;
@@ -75,7 +76,8 @@ struct Force {
     for (int k = 0; k < Team::particles_per_thread; ++k) {
       const Float3 part = sum[k].pressure + own[k].inverse_density * sum[k].viscous;
       const Float3 acceleration = Float3{team.sum(part.x), team.sum(part.y), team.sum(part.z)} + c.gravity;
-      if (team.active(k) && team.is_leader()) then(team.particle(k), x[k], own[k].v, acceleration);
+      if constexpr (Then::by_team) then(team, team.particle(k), x[k], own[k].v, acceleration);
+      else if (team.active(k) && team.is_leader()) then(team.particle(k), x[k], own[k].v, acceleration);
     }
   }
 };

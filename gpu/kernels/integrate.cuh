@@ -25,18 +25,23 @@ struct Integrate {
   DeviceGeometry geometry;
   After after;
 
-  DECANT_DEVICE void operator()(int i, Float3 x, Float3 v, Float3 acceleration) const {
+  /// By all threads of the particle's team.
+  static constexpr bool by_team = true;
+  template <class Team>
+  DECANT_DEVICE void operator()(const Team& team, int i, Float3 x, Float3 v, Float3 acceleration) const {
     const auto prefetched = after.prefetch(i);
     const float old_clearance = a.current.velocity[i].w, wall_step = a.status->wall_step;
-    if (i == 0) ++a.status->substeps_ended;
     v = v + c.dt * acceleration;
     const Float3 displacement = c.dt * v;
     x = x + displacement;
     x = {wrap(0, x.x), wrap(1, x.y), wrap(2, x.z)};
     const float rounding = rounding_of(x);
     float clearance = old_clearance - (1.001f * (sqrtf(dot(displacement, displacement)) + wall_step) + rounding);
-    if (!(clearance > 1.001f * c.contact_distance + rounding)) clearance = collide(c, geometry, a.poses_after(), x, v);
+    if (!(clearance > 1.001f * c.contact_distance + rounding))
+      clearance = collide(team, c, geometry, a.poses_after(), x, v);
     if (collide_with_floor(c, x, v)) clearance = 0.0f;
+    if (!team.is_leader()) return;
+    if (i == 0) ++a.status->substeps_ended;
     if (!is_finite(x) || !is_finite(v)) report(&a.status->non_finite, a.status->substeps_begun, a.id[i]);
     else if (escaped(0, x.x) || escaped(1, x.y) || escaped(2, x.z))
       report(&a.status->escaped, a.status->substeps_begun, a.id[i]);
@@ -63,7 +68,7 @@ integrate_kernel(int particles_and_walls, Integrate<After> integrate, PlaceWalls
   for_each_thread(particles_and_walls, [&](int i) {
     const ParticleArrays& a = integrate.a;
     if (i >= a.n) return walls(i - a.n);
-    integrate(i, xyz(a.force_position[i]), xyz(a.force_velocity[i]), xyz(a.acceleration[i]));
+    integrate(SubWarp<1>(i), i, xyz(a.force_position[i]), xyz(a.force_velocity[i]), xyz(a.acceleration[i]));
   });
 }
 

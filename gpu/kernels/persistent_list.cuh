@@ -39,7 +39,7 @@ template <int lanes, bool periodic>
 DECANT_KERNEL(persistent_block, 1)
 persistent_list_kernel(int substeps, const DECANT_GRID_CONSTANT ListSubstep<periodic> s) {
   const PersistentGrid grid;
-  PersistentTimer timer(s.status->stage_ns);
+  PersistentTimer timer;
 #pragma unroll 1
   for (int k = 0; k < substeps; ++k) {
     if (atomic_load(&s.status->rebuild_needed) != 0) {
@@ -55,6 +55,7 @@ persistent_list_kernel(int substeps, const DECANT_GRID_CONSTANT ListSubstep<peri
       grid.sync();
       timer.lap(0);
     }
+    grid.once(BeginSubstep{s.density.a, true});
     grid.template for_each_team<lanes>(s.n, s.density);
     grid.for_each(s.moving_walls, s.walls_for_force);
     grid.sync();
@@ -64,6 +65,7 @@ persistent_list_kernel(int substeps, const DECANT_GRID_CONSTANT ListSubstep<peri
     grid.sync();
     timer.lap(2);
   }
+  timer.store(s.status->stage_ns);
 }
 
 }  // namespace

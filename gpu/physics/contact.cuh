@@ -2,6 +2,7 @@
 /// Distance to a container's solid and the push out of it, in fp32, written apart from the oracle's.
 #pragma once
 
+#include "gpu/core/teams.cuh"
 #include "gpu/physics/pose.cuh"
 
 namespace decant::gpu {
@@ -30,29 +31,44 @@ struct Clearance {
 
 DECANT_DEVICE float clamp01(float s) { return fminf(fmaxf(s, 0.0f), 1.0f); }
 
-DECANT_DEVICE Clearance revolved_clearance(const DeviceGeometry& g, const Shape& shape, Float3 x) {
+/// From the nearest point of an edge, which is at s of its length, to (r, z).
+struct FromEdge {
+  float pr, pz, s, r, z;
+  DECANT_DEVICE FromEdge(const Edge& e, float to_r, float to_z)
+      : pr(to_r - e.r0),
+        pz(to_z - e.z0),
+        s(clamp01((pr * e.dr + pz * e.dz) * e.inverse_length2)),
+        r(pr - s * e.dr),
+        z(pz - s * e.dz) {}
+  DECANT_DEVICE float squared() const { return r * r + z * z; }
+};
+
+/// By all threads of a team, which have the same x.
+template <class Team>
+DECANT_DEVICE Clearance revolved_clearance(const Team& team, const DeviceGeometry& g, const Shape& shape, Float3 x) {
   const Radius axis = radius(x.x * x.x + x.y * x.y);
   const float r = axis.r, z = x.z;
-  float best = 3.0e38f, away_r = 0.0f, away_z = 0.0f, face_r = 0.0f, face_z = 0.0f;
-  bool inside = false, at_corner = false;
-  for (int k = 0; k < shape.edges; ++k) {
+  float best = 3.0e38f;
+  int nearest = 0, crossings = 0;
+  // Nothing in it waits for the edge before: a few particles at walls are what a kernel ends with.
+#pragma unroll 4
+  for (int k = team.lane(); k < shape.edges; k += Team::lanes) {
     const Edge e = g.edge(shape.first_edge + k);
-    const float pr = r - e.r0, pz = z - e.z0;
-    const float s = clamp01((pr * e.dr + pz * e.dz) * e.inverse_length2);
-    const float ar = pr - s * e.dr, az = pz - s * e.dz;
-    const float squared = ar * ar + az * az;
-    if (squared < best) {
-      best = squared;
-      away_r = ar;
-      away_z = az;
-      face_r = e.dz;  // the solid is on the left, so outward is right
-      face_z = -e.dr;
-      at_corner = !(s > 0.0f && s < 1.0f);
-    }
+    const FromEdge from(e, r, z);
+    const float squared = from.squared();
+    nearest = squared < best ? k : nearest;
+    best = lesser(squared, best);
     // Even–odd count of the outline beyond r at this height.
-    if ((e.z0 > z) != (e.z1 > z) && pr < pz * e.slope) inside = !inside;
+    crossings += (e.z0 > z) != (e.z1 > z) && from.pr < from.pz * e.slope;
   }
-  const Radius away = radius(best);
+  team.find_least(best, nearest);
+  const bool inside = team.sum(crossings) % 2 != 0;
+  const Edge e = g.edge(shape.first_edge + nearest);
+  const FromEdge from(e, r, z);
+  const float away_r = from.r, away_z = from.z;
+  const float face_r = e.dz, face_z = -e.dr;  // the solid is on the left, so outward is right
+  const bool at_corner = !(from.s > 0.0f && from.s < 1.0f);
+  const Radius away = radius(from.squared());
   const float d = away.r, sign = inside ? -1.0f : 1.0f;
   float nr, nz;
   // Beside an edge its own normal is exact, where a difference of near points is not.
@@ -69,21 +85,26 @@ DECANT_DEVICE Clearance revolved_clearance(const DeviceGeometry& g, const Shape&
   return {sign * d, {nr * cosine, nr * sine, nz}};
 }
 
-DECANT_DEVICE Clearance box_clearance(const DeviceGeometry& g, const Shape& shape, Float3 x) {
+template <class Team>
+DECANT_DEVICE Clearance box_clearance(const Team& team, const DeviceGeometry& g, const Shape& shape, Float3 x) {
+  const Face* faces = g.faces + shape.first_face;
+  const auto from = [&](const Face& f) DECANT_INLINE {
+    return Float3{x.x - fminf(fmaxf(x.x, f.min.x), f.max.x), x.y - fminf(fmaxf(x.y, f.min.y), f.max.y),
+                  x.z - fminf(fmaxf(x.z, f.min.z), f.max.z)};
+  };
   float best = 3.0e38f;
-  Float3 away{0, 0, 0};
-  Face nearest{};
-  for (int k = 0; k < shape.faces; ++k) {
-    const Face f = g.faces[shape.first_face + k];
-    const Float3 to_x{x.x - fminf(fmaxf(x.x, f.min.x), f.max.x), x.y - fminf(fmaxf(x.y, f.min.y), f.max.y),
-                      x.z - fminf(fmaxf(x.z, f.min.z), f.max.z)};
-    if (dot(to_x, to_x) < best) {
-      best = dot(to_x, to_x);
-      away = to_x;
-      nearest = f;
-    }
+  int number = 0;
+#pragma unroll 4
+  for (int k = team.lane(); k < shape.faces; k += Team::lanes) {
+    const Float3 to_x = from(faces[k]);
+    number = dot(to_x, to_x) < best ? k : number;
+    best = lesser(dot(to_x, to_x), best);
   }
+  team.find_least(best, number);
+  const Face nearest = faces[number];
+  const Float3 away = from(nearest);
   bool inside = false;
+#pragma unroll 4
   for (int k = 0; k < shape.boxes; ++k) {
     const Box b = g.boxes[shape.first_box + k];
     inside = inside ||
@@ -119,14 +140,16 @@ DECANT_DEVICE float distance_from_box(const Shape& shape, Float3 x) {
   return sqrtf(dot(off, off));
 }
 
-DECANT_DEVICE Clearance clearance_of(const DeviceGeometry& g, const Shape& shape, Float3 x) {
-  return shape.revolved ? revolved_clearance(g, shape, x) : box_clearance(g, shape, x);
+template <class Team>
+DECANT_DEVICE Clearance clearance_of(const Team& team, const DeviceGeometry& g, const Shape& shape, Float3 x) {
+  return shape.revolved ? revolved_clearance(team, g, shape, x) : box_clearance(team, g, shape, x);
 }
 
 /// All containers in turn, as they stand at the end of the substep. Returns a distance that all solids
 /// keep from x at least: 0 after a push, or where periodic axes have solids everywhere.
-DECANT_DEVICE float collide(const Constants& c, const DeviceGeometry& g, const DevicePose* poses, Float3& x,
-                            Float3& v) {
+template <class Team>
+DECANT_DEVICE float collide(const Team& team, const Constants& c, const DeviceGeometry& g, const DevicePose* poses,
+                            Float3& x, Float3& v) {
   const float reach = c.contact_distance;
   float clear = c.any_periodic ? 0.0f : 3.0e38f;
   for (int k = 0; k < g.containers; ++k) {
@@ -138,7 +161,7 @@ DECANT_DEVICE float collide(const Constants& c, const DeviceGeometry& g, const D
         clear = lesser(clear, away);
         break;
       }
-      const Clearance near = clearance_of(g, shape, local);
+      const Clearance near = clearance_of(team, g, shape, local);
       if (!(near.distance < reach)) {
         clear = lesser(clear, near.distance);
         break;
@@ -165,7 +188,7 @@ DECANT_DEVICE float clearance(const Constants& c, const DeviceGeometry& g, const
     if (c.any_periodic) return 0.0f;
     const Float3 at = rotate_back(poses[k], x - poses[k].translation);
     const float away = distance_from_box(shape, at);
-    least = lesser(least, away > 0.0f ? away : fmaxf(clearance_of(g, shape, at).distance, 0.0f));
+    least = lesser(least, away > 0.0f ? away : fmaxf(clearance_of(SubWarp<1>(0), g, shape, at).distance, 0.0f));
   }
   return least;
 }

@@ -113,7 +113,7 @@ fault("no-wrap", "particles that leave a periodic domain are not put back",
       "if (!c.periodic[axis]) return x;", "if (ON || !c.periodic[axis]) return x;", "trajectory", "list",
       fixture="hostile-periodic")
 fault("faces-forgotten", "every other face of a box does not hold",
-      "for (int k = 0; k < shape.faces; ++k) {", "for (int k = 0; k < shape.faces; k += ON ? 2 : 1) {",
+      "k < shape.faces; k += Team::lanes) {", "k < shape.faces; k += (ON ? 2 : 1) * Team::lanes) {",
       "substep", fixture="hostile-crowd")
 fault("crowd-cut", "a particle has at most 64 neighbors",
       "list.staged.append(near & there, j);",

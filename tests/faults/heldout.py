@@ -113,7 +113,7 @@ fault("outline-vertex-counted-twice", "an outline's end point counts for both of
       shows="a particle in a cup's mouth whose local z is exactly that of the rim: it is thought to be inside "
             "the solid and thrown to the wall")
 fault("edge-normal-at-corner", "at a corner of an outline the nearest edge's normal is used",
-      "!(s > 0.0f && s < 1.0f)", "false",
+      "!(from.s > 0.0f && from.s < 1.0f)", "false",
       shows="a particle within the contact distance of a cup's rim, diagonally beyond its corner")
 fault("edges-beyond-sixteen", "edges in device memory are numbered from 0 after those in launch arguments",
       "k < near_edges ? first_edges[k] : edges[k]",
@@ -175,8 +175,8 @@ fault("speed-limit-swallows-nan", "speeds are limited to 1000 m/s by fmin and fm
       "           fminf(fmaxf(v.z, -1000.0f), 1000.0f)};",
       shows="a state with a NaN velocity: it comes out finite, and maybe inside the domain")
 fault("contact-at-earlier-pose", "contact sees the containers at the beginning of the substep",
-      "collide(c, geometry, a.poses_after(), x, v)",
-      "collide(c, geometry, a.poses_after() - a.containers, x, v)",
+      "collide(team, c, geometry, a.poses_after(), x, v)",
+      "collide(team, c, geometry, a.poses_after() - a.containers, x, v)",
       shows="contact with a tilting wall, by one substep's motion of the wall")
 fault("cached-clearance-ignores-walls", "the cached distance from solids shrinks by the particle's motion alone",
       "sqrtf(dot(displacement, displacement)) + wall_step", "sqrtf(dot(displacement, displacement))",
