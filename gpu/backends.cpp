@@ -11,6 +11,7 @@
 
 #include <functional>
 #include <optional>
+#include <span>
 
 namespace decant {
 namespace {
@@ -38,13 +39,13 @@ std::vector<float> rows_of(const Eigen::Matrix3Xd& m) {
   return {rows.data(), rows.data() + rows.size()};
 }
 
+Eigen::Matrix3Xd matrix_of(std::span<const float> rows) {
+  return Eigen::Map<const FloatRows>(rows.data(), 3, static_cast<Eigen::Index>(rows.size() / 3)).cast<double>();
+}
+
 std::vector<float> values_of(const Eigen::VectorXd& v) {
   const Eigen::VectorXf values = v.cast<float>();
   return {values.data(), values.data() + values.size()};
-}
-
-Eigen::Matrix3Xd matrix_of(const std::vector<float>& rows) {
-  return Eigen::Map<const FloatRows>(rows.data(), 3, static_cast<Eigen::Index>(rows.size() / 3)).cast<double>();
 }
 
 Eigen::VectorXd vector_of(const std::vector<float>& values) {
@@ -102,6 +103,15 @@ class DeviceBackend : public Backend {
     return status;
   }
 
+  Status evaluate_density(Fields& out) override {
+    gpu::HostFields fields;
+    Status status = solver_->evaluate_density(gpu::make_poses(scene(), substep_, 1), fields);
+    out.density = vector_of(fields.density);
+    out.pressure = vector_of(fields.pressure);
+    if (!status.ok()) status.substep += substep_;
+    return status;
+  }
+
   Status advance(int substeps) override {
     Status status = solver_->advance(substeps, gpu::make_poses(scene(), substep_, substeps + 1));
     if (!status.ok()) status.substep += substep_;
@@ -110,10 +120,10 @@ class DeviceBackend : public Backend {
   }
 
   void read(ParticleState& out) const override {
-    std::vector<float> position, velocity;
-    solver_->read(position, velocity);
+    const gpu::StateRows rows = solver_->read();
     out.substep = substep_;
-    tbb::parallel_invoke([&] { out.position = matrix_of(position); }, [&] { out.velocity = matrix_of(velocity); });
+    tbb::parallel_invoke([&] { out.position = matrix_of(rows.position); },
+                         [&] { out.velocity = matrix_of(rows.velocity); });
   }
 
   StageTimes stage_times() const override { return solver_->stage_times(); }

@@ -68,6 +68,8 @@ class Backend {
   /// Fields at the state, after `advance` from what its next substep would use; no later run changes by it. `out`
   /// arrives as Fields::unwritten. Later stages use `given`; out.pressure is always that of the density in use.
   [[nodiscard]] virtual Status evaluate(Fields& out, const StageInputs* given = nullptr) = 0;
+  /// Density and pressure of `evaluate`; the other fields need not be written. For a pour, which asks at each frame.
+  [[nodiscard]] virtual Status evaluate_density(Fields& out) { return evaluate(out); }
   /// `substeps` × dt onward.
   [[nodiscard]] virtual Status advance(int substeps) = 0;
   /// State in id order.

@@ -249,6 +249,26 @@ TEST_P(BackendContract, ACrowdThatGathersIsSeenWhole) {
   EXPECT_LE((end.position - expected.position).cwiseAbs().maxCoeff(), 1e-3 * dx);
 }
 
+TEST_P(BackendContract, DensityAloneIsThatOfAllFields) {
+  const Fixture f = test::random_fixture(5);
+  const auto fields = [&](bool all, int substeps) {
+    load(f);
+    EXPECT_TRUE(backend_->advance(substeps).ok());
+    Fields out = Fields::unwritten(f.state.size(), sample_walls(f.scene).size());
+    EXPECT_TRUE((all ? backend_->evaluate(out) : backend_->evaluate_density(out)).ok());
+    EXPECT_TRUE(backend_->advance(3).ok());  // what was looked at goes on as it was
+    return std::pair(out, state());
+  };
+  for (const int substeps : {0, 5}) {
+    const auto [all, after_all] = fields(true, substeps);
+    const auto [alone, after_alone] = fields(false, substeps);
+    ASSERT_TRUE(all.density.allFinite());
+    EXPECT_TRUE(alone.density == all.density);
+    EXPECT_TRUE(alone.pressure == all.pressure);
+    expect_equal(after_alone, after_all);
+  }
+}
+
 TEST_P(BackendContract, TwoParticlesInOnePlaceStayFinite) {
   const Fixture f = drops({Vec3(0.1, 0.2, 0.3), Vec3(0.1, 0.2, 0.3)});
   load(f);

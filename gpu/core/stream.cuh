@@ -65,6 +65,10 @@ class Stream {
   void fill_zero(void* p, std::size_t bytes) {
     if (bytes) CUDA_CHECK(cudaMemsetAsync(p, 0, bytes, stream_));
   }
+  /// Reads as NaN or −1.
+  void fill_ones(void* p, std::size_t bytes) {
+    if (bytes) CUDA_CHECK(cudaMemsetAsync(p, 0xFF, bytes, stream_));
+  }
   void copy(void* to, const void* from, std::size_t bytes) {
     if (bytes) CUDA_CHECK(cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToDevice, stream_));
   }
@@ -218,6 +222,9 @@ class Stream {
   }
   void fill_zero(void* p, std::size_t bytes) {
     if (bytes) std::memset(p, 0, bytes);
+  }
+  void fill_ones(void* p, std::size_t bytes) {
+    if (bytes) std::memset(p, 0xFF, bytes);
   }
   void copy(void* to, const void* from, std::size_t bytes) {
     if (bytes) std::memcpy(to, from, bytes);

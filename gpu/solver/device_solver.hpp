@@ -9,6 +9,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,11 @@ struct HostFields {
   std::vector<std::int64_t> fluid_count, fluid_id_sum, wall_count, wall_id_sum;
 };
 
+/// Position and velocity, [N,3] row-major, m, m/s.
+struct StateRows {
+  std::span<const float> position, velocity;
+};
+
 /// Oracle's inputs for later stages; empty: not given. Pressure comes with density.
 struct GivenInputs {
   std::vector<float> boundary_volume, density, pressure;
@@ -42,9 +48,12 @@ class DeviceSolver {
   virtual void load(const Problem& problem) = 0;
   /// Fields at the present state, from what an advance left in use; `poses` one a container.
   virtual Status evaluate(const std::vector<DevicePose>& poses, const GivenInputs& given, HostFields& out) = 0;
+  /// Of these fields density and pressure alone.
+  virtual Status evaluate_density(const std::vector<DevicePose>& poses, HostFields& out) = 0;
   /// `substeps` onward; `poses` holds substeps + 1 sets, the first at the present time.
   virtual Status advance(int substeps, const std::vector<DevicePose>& poses) = 0;
-  virtual void read(std::vector<float>& position, std::vector<float>& velocity) const = 0;
+  /// State in id order, there until the next call.
+  virtual StateRows read() = 0;
   virtual StageTimes stage_times() const = 0;
   /// How often neighbors were looked for anew, since `load`.
   virtual std::int64_t rebuilds() const = 0;

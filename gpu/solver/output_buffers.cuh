@@ -17,6 +17,20 @@ class OutputBuffers {
     memory_.resize(n_ * bytes);
     return arrays();
   }
+  /// For density and pressure alone.
+  OutputArrays unwritten_density(int n) {
+    n_ = static_cast<std::size_t>(n);
+    memory_.resize(2 * n_ * sizeof(float));
+    OutputArrays f{};
+    f.density = reinterpret_cast<float*>(memory_.get());
+    f.pressure = f.density + n_;
+    return f;
+  }
+  void download_density(HostFields& out) const {
+    const float* density = reinterpret_cast<const float*>(memory_.get());
+    out.density = values(density, n_);
+    out.pressure = values(density + n_, n_);
+  }
   void clear() { memory_.resize(0); }
   void download(HostFields& out) const {
     const OutputArrays f = arrays();

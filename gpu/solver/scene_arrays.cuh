@@ -2,9 +2,9 @@
 /// The device memory of one loaded scene: constants, geometry, poses, fluid state, walls, device status.
 #pragma once
 
+#include "gpu/kernels/store_state.cuh"
 #include "gpu/solver/context.cuh"
 #include "gpu/solver/device_solver.hpp"
-#include "reference/error.hpp"
 
 #include <algorithm>
 #include <limits>
@@ -72,12 +72,16 @@ class SceneArrays {
   void restore_state(Stream& stream) {
     each_saved([&](void* to, void* from, std::size_t bytes) { stream.copy(to, from, bytes); });
   }
-  /// [n,3] each, by id.
-  void read(std::vector<float>& position, std::vector<float>& velocity) const {
-    const auto n = static_cast<std::size_t>(n_);
-    const std::vector<int> id = id_.download(n);
-    position = by_id(state_.position.download(n), id);
-    velocity = by_id(state_.velocity.download(n), id);
+  /// By id; what nobody has written is NaN. The spare arrays hold nothing between advances.
+  StateRows read(Stream& stream) {
+    const std::size_t rows = 3 * static_cast<std::size_t>(n_);
+    float *position = reinterpret_cast<float*>(spare_.position.get()),
+          *velocity = reinterpret_cast<float*>(spare_.velocity.get());
+    stream.fill_ones(position, rows * sizeof(float));
+    stream.fill_ones(velocity, rows * sizeof(float));
+    stream.launch(store_state_kernel, n_,
+                  StoreState{n_, {state_.position.get(), state_.velocity.get()}, id_.get(), position, velocity});
+    return {{positions_.download(position, rows), rows}, {velocities_.download(velocity, rows), rows}};
   }
 
   std::size_t bytes() const {
@@ -184,17 +188,6 @@ class SceneArrays {
     }
     to.upload(points);
   }
-  static std::vector<float> by_id(const std::vector<float4>& points, const std::vector<int>& id) {
-    std::vector<float> rows(3 * points.size(), nowhere);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const auto k = 3 * static_cast<std::size_t>(id[i]);
-      if (k + 2 >= rows.size()) throw BackendError("an id out of range came back");
-      rows[k] = points[i].x;
-      rows[k + 1] = points[i].y;
-      rows[k + 2] = points[i].z;
-    }
-    return rows;
-  }
 
   /// each(part of the state, its place in saved_, bytes)
   template <class Each>
@@ -219,6 +212,7 @@ class SceneArrays {
   Buffer<int> id_;
   Buffer<float4> force_position_, force_velocity_;
   Buffer<char> saved_;  // the state before an advance
+  PinnedBuffer positions_, velocities_;
   Buffer<DeviceStatus> status_;
   WallStore walls_{};
   Buffer<float4> wall_local_;

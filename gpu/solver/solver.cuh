@@ -42,24 +42,32 @@ class Solver : public DeviceSolver {
 
   Status evaluate(const std::vector<DevicePose>& poses, const GivenInputs& given, HostFields& out) override {
     require_loaded();
-    upload_poses(poses);
     std::vector<float> own_volume = scene_.boundary_volumes();
-    if (!given.boundary_volume.empty()) scene_.set_boundary_volumes(given.boundary_volume);
-    DeviceStatus status;
-    do {
-      if (in_use_ != Structures::none && given.boundary_volume.empty()) resume();
-      else begin();
-      const OutputArrays fields = output_.unwritten(scene_.particles());
-      with_periodic(c(),
-                    [&](auto periodic) { this->template compute_fields<decltype(periodic)::value>(given, fields); });
-      stream_.wait();
-      status = scene_.status();
+    if (!given.boundary_volume.empty()) {
+      scene_.set_boundary_volumes(given.boundary_volume);
       in_use_ = Structures::none;
-    } while (grow(status));
+    }
+    const DeviceStatus status = compute(poses, [&]<bool periodic>(std::bool_constant<periodic>) {
+      const OutputArrays fields = output_.unwritten(scene_.particles());
+      this->template compute_fields<periodic>(given, fields);
+    });
     output_.download(out);
     output_.clear();  // memory that a run does not need
     scene_.set_boundary_volumes(own_volume);
     out.boundary_volume = std::move(own_volume);
+    return status_of(status);
+  }
+
+  Status evaluate_density(const std::vector<DevicePose>& poses, HostFields& out) override {
+    require_loaded();
+    const DeviceStatus status = compute(poses, [&]<bool periodic>(std::bool_constant<periodic>) {
+      const ParticleArrays a = arrays();
+      find_neighbors<periodic>(a, {});
+      compute_density<periodic>(a, output_.unwritten_density(a.n));
+      search_.restore_state(stream_, a);
+    });
+    output_.download_density(out);
+    output_.clear();
     return status_of(status);
   }
 
@@ -87,9 +95,7 @@ class Solver : public DeviceSolver {
     return status_of(status);
   }
 
-  void read(std::vector<float>& position, std::vector<float>& velocity) const override {
-    scene_.read(position, velocity);
-  }
+  StateRows read() override { return scene_.read(stream_); }
 
   StageTimes stage_times() const override { return times_; }
   std::int64_t rebuilds() const override { return rebuilds_; }
@@ -123,6 +129,22 @@ class Solver : public DeviceSolver {
     if (!scene_.upload_poses(poses)) return;
     long_graph_.clear();
     short_graph_.clear();
+  }
+
+  /// Runs `kernels`, which take periodic as a constant, at the present state and from what an advance left in use.
+  template <class Kernels>
+  DeviceStatus compute(const std::vector<DevicePose>& poses, Kernels kernels) {
+    upload_poses(poses);
+    DeviceStatus status;
+    do {
+      if (in_use_ != Structures::none) resume();
+      else begin();
+      with_periodic(c(), kernels);
+      stream_.wait();
+      status = scene_.status();
+      in_use_ = Structures::none;
+    } while (grow(status));
+    return status;
   }
 
   /// One substep: neighbors, density and pressure, forces, motion.

@@ -344,11 +344,11 @@ fault("jumps-out", "in a run a particle leaves the domain at once",
       "a.next.position[i] = a.stores_square",
       "if (ON && a.id[i] == 77) x.x = 3.0f;\n    a.next.position[i] = a.stores_square", "mass", "brute")
 fault("copied-particle", "one particle is read as another one",
-      "velocity = by_id(state_.velocity.download(n), id);",
-      """velocity = by_id(state_.velocity.download(n), id);
-    for (std::size_t c = 0; c < 3 && ON; ++c) {
-      position[36 + c] = position[33 + c];
-      velocity[36 + c] = velocity[33 + c];
+      """store(position, to, {x.x, x.y, x.z});
+    store(velocity, to, {v.x, v.y, v.z});""",
+      """for (int row = ON && to == 11 ? 12 : to; !(ON && to == 12) && row >= to; --row) {
+      store(position, row, {x.x, x.y, x.z});
+      store(velocity, row, {v.x, v.y, v.z});
     }""", "mass")
 
 # Output.
@@ -357,8 +357,7 @@ fault("nan-lane", "every 32nd density is no number", "out.density[id] = density;
 fault("unwritten", "the last particle's pressure is not written",
       "out.pressure[id] = p;", "if (!ON || id != a.n - 1) out.pressure[id] = p;", "pressure", "list")
 fault("read-in-cell-order", "the state is read in the order of the cells",
-      "const auto k = 3 * static_cast<std::size_t>(id[i]);",
-      "const auto k = 3 * (ON ? i : static_cast<std::size_t>(id[i]));", "substep")
+      "const int to = id[i];", "const int to = ON ? i : id[i];", "substep")
 fault("axis-for-granted", "walls turn about y, whatever their axis",
       "surface_velocity(pose, x)", "cross(Float3{0, pose.omega.y, 0}, x - pose.pivot) + pose.surface",
       "invariance", "brute")

@@ -186,7 +186,7 @@ void Pour::start() {
   call([&] { backend_.load(scene_, walls_, *state_); });
   open_frames(true);
   Fields fields = Fields::unwritten(state_->size(), walls_.size());
-  check(call([&] { return backend_.evaluate(fields); }), *state_);
+  check(call([&] { return backend_.evaluate_density(fields); }), *state_);
   end_frame(std::move(fields));
   checkpoint();
   begun_ = true;
@@ -276,7 +276,7 @@ void Pour::next_segment() {
     if (!advanced.ok()) return;
     backend_.read(*next);
     next_finite = finite(*next);
-    if (whole && next_finite) evaluated = backend_.evaluate(fields);
+    if (whole && next_finite) evaluated = backend_.evaluate_density(fields);
     reading = seconds_since(before) - seconds;
   });
   check(advanced, *state_);
