@@ -1,10 +1,11 @@
 /// \file
-/// What a scene file may say, and the Scene that it means. Ranges that need more than one value at
-/// a time (overlap, time step, fill against cup) are scene_checks.cpp.
+/// The Scene that a file means: scene_format.cpp has keys, types and bounds; here is what takes several
+/// values of one object. What takes the whole scene (overlap, time step, fill against cup) is scene_checks.cpp.
 #include "reference/scene_file.hpp"
 
 #include "reference/error.hpp"
 #include "reference/scene_checks.hpp"
+#include "reference/scene_json_reader.hpp"
 #include "reference/scene_motion_reader.hpp"
 #include "reference/shapes.hpp"
 
@@ -16,48 +17,34 @@
 namespace decant {
 namespace {
 
-const Range unit_interval{.low = 0.0, .high = 1.0};
-
-template <typename T>
-T optional_or(const JsonValue& object, const std::string& key, T otherwise, T (*read)(const JsonValue&)) {
-  return object.has(key) ? read(object[key]) : otherwise;
-}
-
-double read_non_negative(const JsonValue& v) { return v.number(non_negative); }
-double read_unit_interval(const JsonValue& v) { return v.number(unit_interval); }
-
 FluidProperties read_fluid(const JsonValue& v) {
-  v.check_keys(keys_of("fluid"));
+  v.check_keys();
   FluidProperties fluid;
-  fluid.rest_density = v["rest_density"].number(positive);
-  fluid.sound_speed = v["sound_speed"].number(positive);
-  fluid.viscosity = v["viscosity"].number(non_negative);
-  if (v.has("eos_exponent")) {
-    const JsonValue exponent = v["eos_exponent"];
-    fluid.eos_exponent = exponent.number({});
-    if (fluid.eos_exponent != 7.0 && fluid.eos_exponent != 1.0) exponent.refuse("7 or 1");
-  }
+  fluid.rest_density = v["rest_density"].number();
+  fluid.sound_speed = v["sound_speed"].number();
+  fluid.viscosity = v["viscosity"].number();
+  if (v.has("eos_exponent")) fluid.eos_exponent = v["eos_exponent"].number();
   if (v.has("allow_tension")) fluid.allow_tension = v["allow_tension"].boolean();
-  fluid.wall_viscosity = optional_or(v, "wall_viscosity", 2.0 * fluid.viscosity, read_non_negative);
+  fluid.wall_viscosity = v.has("wall_viscosity") ? v["wall_viscosity"].number() : 2.0 * fluid.viscosity;
   return fluid;
 }
 
-/// \param keys  the name of the object that has `min` and `max`, for its other keys
-SolidBox read_box(const JsonValue& v, const std::string& keys) {
-  v.check_keys(keys_of(keys));
-  const SolidBox box{v["min"].vector(coordinate), v["max"].vector(coordinate)};
+/// `min` and `max` of an object, which may have other keys.
+SolidBox read_box(const JsonValue& v) {
+  v.check_keys();
+  const SolidBox box{v["min"].vector(), v["max"].vector()};
   for (int a = 0; a < 3; ++a)
     if (!(box.min[a] < box.max[a]))
-      v["max"].elements(3, 3)[static_cast<std::size_t>(a)].refuse("greater than min, which is " + to_text(box.min[a]));
+      v["max"].elements()[static_cast<std::size_t>(a)].refuse("greater than min, which is " + to_text(box.min[a]));
   return box;
 }
 
 Domain read_domain(const JsonValue& v) {
-  const SolidBox box = read_box(v, "domain");
+  const SolidBox box = read_box(v);
   Domain domain{box.min, box.max, {false, false, false}};
   if (!v.has("periodic")) return domain;
-  for (const auto& axis : v["periodic"].elements(0, 3)) {
-    const auto a = axis.choice({"x", "y", "z"});
+  for (const auto& axis : v["periodic"].elements()) {
+    const auto a = axis.choice();
     if (domain.periodic[a]) axis.refuse("each axis once");
     domain.periodic[a] = true;
   }
@@ -65,12 +52,11 @@ Domain read_domain(const JsonValue& v) {
 }
 
 Contact read_contact(const JsonValue& v) {
-  v.check_keys(keys_of("contact"));
+  v.check_keys();
   Contact contact;
-  // The lattice starts dx/2 from the walls: a longer contact distance would move it at once.
-  if (v.has("distance_ratio")) contact.distance_ratio = v["distance_ratio"].number({.low = 0.0, .high = 0.5});
-  contact.restitution = optional_or(v, "restitution", contact.restitution, read_unit_interval);
-  contact.friction = optional_or(v, "friction", contact.friction, read_non_negative);
+  if (v.has("distance_ratio")) contact.distance_ratio = v["distance_ratio"].number();
+  if (v.has("restitution")) contact.restitution = v["restitution"].number();
+  if (v.has("friction")) contact.friction = v["friction"].number();
   return contact;
 }
 
@@ -80,10 +66,10 @@ double cross(const std::array<double, 2>& o, const std::array<double, 2>& a, con
 
 RevolvedShape read_profile(const JsonValue& v) {
   RevolvedShape shape;
-  const auto points = v.elements(3, 1000);
+  const auto points = v.elements();
   for (const auto& point : points) {
-    const auto rz = point.elements(2, 2);
-    shape.profile.push_back({rz[0].number({.low = 0.0, .high = coordinate.high}), rz[1].number(coordinate)});
+    const auto rz = point.elements();
+    shape.profile.push_back({rz[0].number(), rz[1].number()});
   }
   const auto& p = shape.profile;
   const std::size_t n = p.size();
@@ -108,13 +94,13 @@ RevolvedShape read_profile(const JsonValue& v) {
 }
 
 BoxShape read_tank(const JsonValue& v, const Domain& domain, double& wall_thickness) {
-  v.check_keys(keys_of("tank"));
-  wall_thickness = v["wall_thickness"].number(positive);
-  const Vec3 size = v["size"].vector(positive);
+  v.check_keys();
+  wall_thickness = v["wall_thickness"].number();
+  const Vec3 size = v["size"].vector();
   OpenFaces open{};
   if (v.has("open"))
-    for (const auto& face : v["open"].elements(0, 5)) {
-      const auto which = face.choice({"-x", "+x", "-y", "+y", "-z", "+z"});
+    for (const auto& face : v["open"].elements()) {
+      const auto which = face.choice();
       bool& is_open = open[which / 2][which % 2];
       if (is_open) face.refuse("each face once");
       is_open = true;
@@ -131,19 +117,19 @@ BoxShape read_tank(const JsonValue& v, const Domain& domain, double& wall_thickn
     // The walls end where a face is open, so the tank's extent is theirs.
     const auto axis = static_cast<Eigen::Index>(a);
     if (both_open && !domain.periodic[a] && size[axis] < wall_thickness)
-      v["size"].elements(3, 3)[a].refuse("no less than wall_thickness, which is " + to_text(wall_thickness) +
-                                         ", where both faces are open");
+      v["size"].elements()[a].refuse("no less than wall_thickness, which is " + to_text(wall_thickness) +
+                                     ", where both faces are open");
   }
   return tank_shape(size, wall_thickness, open);
 }
 
 BoxShape read_boxes(const JsonValue& v, const Domain& domain, double& wall_thickness) {
-  v.check_keys(keys_of("boxes"));
-  wall_thickness = v["wall_thickness"].number(positive);
+  v.check_keys();
+  wall_thickness = v["wall_thickness"].number();
   BoxShape shape;
-  shape.cavity = read_box(v["cavity"], "box");
-  for (const auto& box : v["solid"].elements(1, 1000)) {
-    shape.solid.push_back(read_box(box, "box"));
+  shape.cavity = read_box(v["cavity"]);
+  for (const auto& box : v["solid"].elements()) {
+    shape.solid.push_back(read_box(box));
     const Vec3 extent = shape.solid.back().max - shape.solid.back().min;
     for (std::size_t a = 0; a < 3; ++a)
       // Ends on a periodic axis are no surface, so that extent is no thickness.
@@ -154,23 +140,20 @@ BoxShape read_boxes(const JsonValue& v, const Domain& domain, double& wall_thick
 }
 
 Container read_container(const JsonValue& v, const Domain& domain) {
-  v.check_keys(keys_of("container"));
+  v.check_keys();
   Container container;
   container.name = v["name"].name();
-  container.origin =
-      optional_or<Vec3>(v, "origin", Vec3::Zero(), [](const JsonValue& o) { return o.vector(coordinate); });
-  if (v.has("cup") + v.has("tank") + v.has("revolved") + v.has("boxes") != 1)
-    v.refuse("exactly one of cup, tank, revolved, boxes");
+  if (v.has("origin")) container.origin = v["origin"].vector();
+  v.check_alternatives();
   if (v.has("cup")) {
     const JsonValue cup = v["cup"];
-    cup.check_keys(keys_of("cup"));
-    container.wall_thickness = cup["wall_thickness"].number(positive);
-    container.shape =
-        cup_shape(cup["inner_radius"].number(positive), cup["inner_height"].number(positive), container.wall_thickness);
+    cup.check_keys();
+    container.wall_thickness = cup["wall_thickness"].number();
+    container.shape = cup_shape(cup["inner_radius"].number(), cup["inner_height"].number(), container.wall_thickness);
   } else if (v.has("revolved")) {
     const JsonValue revolved = v["revolved"];
-    revolved.check_keys(keys_of("revolved"));
-    container.wall_thickness = revolved["wall_thickness"].number(positive);
+    revolved.check_keys();
+    container.wall_thickness = revolved["wall_thickness"].number();
     container.shape = read_profile(revolved["profile"]);
   } else {
     BoxShape shape = v.has("tank") ? read_tank(v["tank"], domain, container.wall_thickness)
@@ -180,7 +163,7 @@ Container read_container(const JsonValue& v, const Domain& domain) {
   }
   if (v.has("tilt")) container.tilt = read_tilt(v["tilt"]);
   if (v.has("translation")) container.translation = read_translation(v["translation"]);
-  if (v.has("surface_velocity")) container.surface_velocity = v["surface_velocity"].vector(speed);
+  if (v.has("surface_velocity")) container.surface_velocity = v["surface_velocity"].vector();
   return container;
 }
 
@@ -188,17 +171,17 @@ Container read_container(const JsonValue& v, const Domain& domain) {
 RoundShape read_round(const JsonValue& fill) {
   const bool rod = fill.has("rod");
   const JsonValue v = fill[rod ? "rod" : "ball"];
-  v.check_keys(keys_of(rod ? "rod" : "ball"));
-  RoundShape shape{v["center"].vector(coordinate), v["radius"].number(positive)};
+  v.check_keys();
+  RoundShape shape{v["center"].vector(), v["radius"].number()};
   if (rod) {
-    shape.axis = static_cast<int>(v["axis"].choice({"x", "y", "z"}));
-    shape.length = v["length"].number(positive);
+    shape.axis = static_cast<int>(v["axis"].choice());
+    shape.length = v["length"].number();
   }
   return shape;
 }
 
 Fill read_fill(const JsonValue& v, const std::vector<Container>& containers) {
-  v.check_keys(keys_of("fill"));
+  v.check_keys();
   Fill fill;
   const auto name_of_container = [&](const JsonValue& name) {
     std::string names;
@@ -210,118 +193,84 @@ Fill read_fill(const JsonValue& v, const std::vector<Container>& containers) {
   };
   if (v.has("container")) fill.container = name_of_container(v["container"]);
   if (v.has("around"))
-    for (const auto& name : v["around"].elements(1, 100)) {
+    for (const auto& name : v["around"].elements()) {
       const std::string other = name_of_container(name);
       if (other == fill.container) name.refuse("another container than the one that is filled");
       if (std::find(fill.around.begin(), fill.around.end(), other) != fill.around.end())
         name.refuse("each container once");
       fill.around.push_back(other);
     }
-  if (v.has("level") + v.has("box") + v.has("ball") + v.has("rod") != 1)
-    v.refuse("exactly one of level, box, ball, rod");
+  v.check_alternatives();
   if (v.has("level")) {
     if (fill.container.empty()) v["level"].refuse("a box, because no container is named");
-    fill.level = v["level"].number(positive);
+    fill.level = v["level"].number();
   } else if (v.has("box")) {
-    fill.box = read_box(v["box"], "box");
+    fill.box = read_box(v["box"]);
   } else {
     fill.round = read_round(v);
     fill.box = fill.round->bounds();
   }
-  if (v.has("velocity")) fill.velocity = v["velocity"].vector(speed);
+  if (v.has("velocity")) fill.velocity = v["velocity"].vector();
   if (v.has("velocity_gradient")) {
     const JsonValue gradient = v["velocity_gradient"];
-    gradient.check_keys(keys_of("velocity_gradient"));
-    const auto rows = gradient["matrix"].elements(3, 3);
+    gradient.check_keys();
+    const auto rows = gradient["matrix"].elements();
     for (Eigen::Index a = 0; a < 3; ++a)
-      fill.velocity_gradient.row(a) = rows[static_cast<std::size_t>(a)].vector({.low = -1e6, .high = 1e6}).transpose();
-    fill.gradient_about = gradient["about"].vector(coordinate);
+      fill.velocity_gradient.row(a) = rows[static_cast<std::size_t>(a)].vector().transpose();
+    fill.gradient_about = gradient["about"].vector();
   }
   return fill;
 }
 
 Schedule read_time(const JsonValue& v) {
-  v.check_keys(keys_of("time"));
+  v.check_keys();
   Schedule schedule;
-  schedule.end = v["end"].number(positive);
-  schedule.frames = v["frames"].integer(1, 1000000);
-  if (v.has("courant")) schedule.courant = v["courant"].number({.low = 0.0, .high = 0.4, .low_open = true});
-  if (v.has("substeps_per_frame")) schedule.substeps_per_frame = v["substeps_per_frame"].integer(1, 1000000000);
+  schedule.end = v["end"].number();
+  schedule.frames = v["frames"].integer();
+  if (v.has("courant")) schedule.courant = v["courant"].number();
+  if (v.has("substeps_per_frame")) schedule.substeps_per_frame = v["substeps_per_frame"].integer();
   schedule.substeps_derived = !v.has("substeps_per_frame");
   if (v.has("substeps_derived")) {
     schedule.substeps_derived = v["substeps_derived"].boolean();
     if (!schedule.substeps_derived && schedule.substeps_per_frame == 0)
       v["substeps_derived"].refuse("true, because substeps_per_frame is missing");
   }
-  if (v.has("max_speed")) schedule.max_speed = v["max_speed"].number(positive);
+  if (v.has("max_speed")) schedule.max_speed = v["max_speed"].number();
   return schedule;
 }
 
 }  // namespace
 
-const std::vector<ObjectKeys>& scene_file_keys() {
-  static const std::vector<ObjectKeys> keys = {
-      {"scene",
-       {"decant_scene", "name", "particle_spacing", "fluid", "domain", "fill", "time"},
-       {"$schema", "kernel", "support_ratio", "mass_ratio", "gravity", "floor", "contact", "wall_layers",
-        "containers"}},
-      {"fluid", {"rest_density", "sound_speed", "viscosity"}, {"eos_exponent", "allow_tension", "wall_viscosity"}},
-      {"domain", {"min", "max"}, {"periodic"}},
-      {"floor", {"height"}, {}},
-      {"contact", {}, {"distance_ratio", "restitution", "friction"}},
-      {"container",
-       {"name"},
-       {"cup", "tank", "revolved", "boxes", "origin", "tilt", "translation", "surface_velocity"}},
-      {"cup", {"inner_radius", "inner_height", "wall_thickness"}, {}},
-      {"tank", {"size", "wall_thickness"}, {"open"}},
-      {"revolved", {"profile", "wall_thickness"}, {}},
-      {"boxes", {"cavity", "solid", "wall_thickness"}, {}},
-      {"box", {"min", "max"}, {}},
-      {"tilt", {"pivot", "axis"}, {"keys", "rate", "oscillation"}},
-      {"tilt_key", {"time"}, {"angle", "angle_deg"}},
-      {"tilt_oscillation", {"amplitude", "frequency"}, {"phase"}},
-      {"translation", {}, {"keys", "velocity", "oscillation"}},
-      {"translation_key", {"time", "offset"}, {}},
-      {"translation_oscillation", {"amplitude", "frequency"}, {"phase"}},
-      {"fill", {}, {"container", "level", "box", "ball", "rod", "around", "velocity", "velocity_gradient"}},
-      {"ball", {"center", "radius"}, {}},
-      {"rod", {"center", "radius", "axis", "length"}, {}},
-      {"velocity_gradient", {"matrix", "about"}, {}},
-      {"time", {"end", "frames"}, {"courant", "substeps_per_frame", "substeps_derived", "max_speed"}},
-  };
-  return keys;
-}
-
 Scene parse_scene(std::string_view text, const std::string& file) {
   const nlohmann::json json = parse_json(text, file);
-  const JsonValue v(json, file, "");
-  v.check_keys(keys_of("scene"));
-  v["decant_scene"].integer(1, 1);
+  const ValueFormat format{ObjectReference{"scene"}};
+  const JsonValue v(json, format, file, "");
+  v.check_keys();
+  v["decant_scene"].integer();
   if (v.has("$schema")) v["$schema"].text();
   Scene scene;
   scene.name = v["name"].name();
-  scene.particle_spacing = v["particle_spacing"].number({.low = 1e-6, .high = 1e3});
-  if (v.has("kernel"))
-    scene.kernel = static_cast<KernelFamily>(v["kernel"].choice({kernel_names.begin(), kernel_names.end()}));
-  if (v.has("support_ratio")) scene.support_ratio = v["support_ratio"].number({.low = 1.5, .high = 5.0});
-  if (v.has("mass_ratio")) scene.mass_ratio = v["mass_ratio"].number({.low = 0.5, .high = 2.0});
+  scene.particle_spacing = v["particle_spacing"].number();
+  if (v.has("kernel")) scene.kernel = static_cast<KernelFamily>(v["kernel"].choice());
+  if (v.has("support_ratio")) scene.support_ratio = v["support_ratio"].number();
+  if (v.has("mass_ratio")) scene.mass_ratio = v["mass_ratio"].number();
   scene.fluid = read_fluid(v["fluid"]);
-  if (v.has("gravity")) scene.gravity = v["gravity"].vector({.low = -1e4, .high = 1e4});
+  if (v.has("gravity")) scene.gravity = v["gravity"].vector();
   scene.domain = read_domain(v["domain"]);
   if (v.has("floor")) {
-    v["floor"].check_keys(keys_of("floor"));
-    scene.floor = Floor{v["floor"]["height"].number(coordinate)};
+    v["floor"].check_keys();
+    scene.floor = Floor{v["floor"]["height"].number()};
   }
   if (v.has("contact")) scene.contact = read_contact(v["contact"]);
-  if (v.has("wall_layers")) scene.wall_layers = v["wall_layers"].integer(1, 8);
+  if (v.has("wall_layers")) scene.wall_layers = v["wall_layers"].integer();
   if (v.has("containers"))
-    for (const auto& container : v["containers"].elements(0, 100)) {
+    for (const auto& container : v["containers"].elements()) {
       scene.containers.push_back(read_container(container, scene.domain));
       for (std::size_t k = 0; k + 1 < scene.containers.size(); ++k)
         if (scene.containers[k].name == scene.containers.back().name)
           container["name"].refuse("a name of its own; containers[" + std::to_string(k) + "] has it already");
     }
-  for (const auto& fill : v["fill"].elements(1, 1000)) scene.fills.push_back(read_fill(fill, scene.containers));
+  for (const auto& fill : v["fill"].elements()) scene.fills.push_back(read_fill(fill, scene.containers));
   scene.schedule = read_time(v["time"]);
   return scene;
 }

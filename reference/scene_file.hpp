@@ -16,16 +16,6 @@ namespace decant {
 /// \param text  JSON, // and /* */ comments allowed; \param file  the name for messages
 Scene parse_scene(std::string_view text, const std::string& file);
 
-/// What one kind of object in a scene file may hold. `name` is also its place in the JSON Schema.
-struct ObjectKeys {
-  std::string name;                   // "scene", "fluid", "tilt_key", …
-  std::vector<std::string> required;  // refused where missing
-  std::vector<std::string> optional;
-};
-
-/// Every object of the format. The parser itself reads this list, so that it cannot lag behind.
-const std::vector<ObjectKeys>& scene_file_keys();
-
 /// Reads, parses and checks (scene_checks.hpp) a scene file; derives the substeps of a frame
 /// unless the file sets them. Throws InputError; warnings go to `warnings` where one is given.
 Scene load_scene(const std::filesystem::path& file, std::vector<std::string>* warnings = nullptr);

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 
 namespace decant {
@@ -34,6 +35,20 @@ std::string member_path(const std::string& path, const std::string& key) {
     return std::isalnum(c) || c == '_' || c == '$' || c == '-';
   });
   return (path.empty() ? "" : path + ".") + (plain ? key : shorten(json(key).dump()));
+}
+
+/// The value as a message shows it: one line, shortened where long.
+std::string shown(const json& value) { return shorten(value.dump(-1, ' ', false, json::error_handler_t::replace)); }
+
+/// The range as a message says it: "a number > 0.0".
+std::string bound_of(const Range& range) {
+  const bool has_low = std::isfinite(range.low), has_high = std::isfinite(range.high);
+  if (has_low && has_high)
+    return std::string("a number in ") + (range.low_open ? "(" : "[") + to_text(range.low) + ", " +
+           to_text(range.high) + "]";
+  if (has_low) return std::string("a number ") + (range.low_open ? "> " : ">= ") + to_text(range.low);
+  if (has_high) return "a number <= " + to_text(range.high);
+  return "a number";
 }
 
 /// Follows the parser through the document, because the parser itself forgets where it is.
@@ -121,32 +136,37 @@ double rounded(double value) {
   return digits >= 0 ? std::round(value * scale) / scale : std::round(value / scale) * scale;
 }
 
-std::string Range::text() const {
-  const bool has_low = std::isfinite(low), has_high = std::isfinite(high);
-  if (has_low && has_high)
-    return "a number in " + std::string(low_open ? "(" : "[") + to_text(low) + ", " + to_text(high) + "]";
-  if (has_low) return std::string("a number ") + (low_open ? "> " : ">= ") + to_text(low);
-  if (has_high) return "a number <= " + to_text(high);
-  return "a number";
-}
-
-void JsonValue::check_keys(const ObjectKeys& keys) const {
-  if (!json_->is_object()) refuse("an object {...} (" + keys.name + ")");
-  std::vector<std::string> known = keys.required;
-  known.insert(known.end(), keys.optional.begin(), keys.optional.end());
+void JsonValue::check_keys() const {
+  const ObjectFormat& format = object();
+  if (!json_->is_object()) refuse("an object {...} (" + format.name + ")");
+  std::vector<std::string> known;
+  for (const bool required : {true, false})
+    for (const Member& member : format.members)
+      if (member.required == required) known.push_back(member.key);
   for (const auto& [key, value] : json_->items())
     if (std::find(known.begin(), known.end(), key) == known.end())
-      JsonValue(value, file_, member_path(path_, key)).refuse("no such key; known keys here: " + joined(known));
-  for (const auto& key : keys.required)
-    if (!has(key))
-      throw InputError(file_, member_path(path_, key), "missing", "a required key; known keys here: " + joined(known));
+      throw InputError(file_, member_path(path_, key), shown(value), "no such key; known keys here: " + joined(known));
+  for (const Member& member : format.members)
+    if (member.required && !json_->contains(member.key))
+      throw InputError(file_, member_path(path_, member.key), "missing",
+                       "a required key; known keys here: " + joined(known));
 }
+
+void JsonValue::check_alternatives() const {
+  const Alternatives& alternatives = object().alternatives;
+  const auto stand = std::count_if(alternatives.keys.begin(), alternatives.keys.end(),
+                                   [&](const auto& keys) { return has(keys.front()); });
+  if (stand < 1 || (alternatives.exactly_one && stand > 1)) refuse(alternatives.bound);
+}
+
+bool JsonValue::has(const std::string& key) const { return json_->contains(member_of(object(), key).key); }
 
 JsonValue JsonValue::operator[](const std::string& key) const {
-  return {json_->at(key), file_, member_path(path_, key)};
+  return {json_->at(key), member_of(object(), key).value, file_, member_path(path_, key)};
 }
 
-std::vector<JsonValue> JsonValue::elements(std::size_t fewest, std::size_t most) const {
+std::vector<JsonValue> JsonValue::elements() const {
+  const auto& [items, fewest, most, unique] = type<ArrayFormat>();
   if (!json_->is_array()) refuse("an array [...]");
   const std::size_t n = json_->size();
   if (n < fewest || n > most)
@@ -154,18 +174,27 @@ std::vector<JsonValue> JsonValue::elements(std::size_t fewest, std::size_t most)
            (fewest == most ? std::to_string(fewest) : std::to_string(fewest) + " to " + std::to_string(most)) +
            " elements, not " + std::to_string(n));
   std::vector<JsonValue> all;
-  for (std::size_t i = 0; i < n; ++i) all.emplace_back((*json_)[i], file_, path_ + "[" + std::to_string(i) + "]");
+  for (std::size_t i = 0; i < n; ++i)
+    all.emplace_back((*json_)[i], items.size() == 1 ? items[0] : items.at(i), file_,
+                     path_ + "[" + std::to_string(i) + "]");
   return all;
 }
 
-double JsonValue::number(const Range& range) const {
-  if (!json_->is_number()) refuse(range.text());
+double JsonValue::number() const {
+  const auto& [range, only] = type<NumberFormat>();
+  if (!json_->is_number()) refuse(bound_of(range));
   const double value = json_->get<double>();
-  if (!std::isfinite(value) || !range.holds(value)) refuse(range.text());
+  if (!std::isfinite(value) || !range.holds(value)) refuse(bound_of(range));
+  if (!only.empty() && std::find(only.begin(), only.end(), value) == only.end()) {
+    std::string bound;
+    for (const int allowed : only) bound += (bound.empty() ? "" : " or ") + std::to_string(allowed);
+    refuse(bound);
+  }
   return value;
 }
 
-int JsonValue::integer(int low, int high) const {
+int JsonValue::integer() const {
+  const auto& [low, high] = type<IntegerFormat>();
   const std::string bound = low == high ? "the integer " + std::to_string(low)
                                         : "an integer in [" + std::to_string(low) + ", " + std::to_string(high) + "]";
   if (!json_->is_number_integer()) refuse(bound);
@@ -176,16 +205,19 @@ int JsonValue::integer(int low, int high) const {
 }
 
 bool JsonValue::boolean() const {
+  (void)type<BooleanFormat>();
   if (!json_->is_boolean()) refuse("true or false");
   return json_->get<bool>();
 }
 
 std::string JsonValue::text() const {
+  (void)type<TextFormat>();
   if (!json_->is_string()) refuse("text in quotes");
   return json_->get<std::string>();
 }
 
 std::string JsonValue::name() const {
+  (void)type<NameFormat>();
   // It becomes part of paths: "." is the group itself to HDF5, and "-x" an option to programs.
   const std::string bound = "a name of 1 to 64 letters, digits, '.', '-' or '_', the first no '.' and no '-'";
   if (!json_->is_string()) refuse(bound);
@@ -198,7 +230,8 @@ std::string JsonValue::name() const {
   return value;
 }
 
-std::size_t JsonValue::choice(const std::vector<std::string>& options) const {
+std::size_t JsonValue::choice() const {
+  const auto& options = type<ChoiceFormat>().options;
   if (json_->is_string()) {
     const auto found = std::find(options.begin(), options.end(), json_->get<std::string>());
     if (found != options.end()) return static_cast<std::size_t>(found - options.begin());
@@ -206,15 +239,13 @@ std::size_t JsonValue::choice(const std::vector<std::string>& options) const {
   refuse("one of " + joined(options));
 }
 
-Vec3 JsonValue::vector(const Range& range) const {
-  const auto parts = elements(3, 3);
-  return {parts[0].number(range), parts[1].number(range), parts[2].number(range)};
+Vec3 JsonValue::vector() const {
+  const auto parts = elements();
+  return {parts.at(0).number(), parts.at(1).number(), parts.at(2).number()};
 }
 
-std::string JsonValue::shown() const { return shorten(json_->dump(-1, ' ', false, json::error_handler_t::replace)); }
-
 void JsonValue::refuse(const std::string& bound) const {
-  throw InputError(file_, path_.empty() ? "(whole file)" : path_, shown(), bound);
+  throw InputError(file_, path_.empty() ? "(whole file)" : path_, shown(*json_), bound);
 }
 
 json parse_json(std::string_view text, const std::string& file) {

@@ -1,31 +1,19 @@
 /// \file
-/// Strict reading of JSON: every value knows its file and key path, so that each refusal names
-/// them.
+/// Strict reading of JSON: every value knows its file, its key path and its entry in scene_format(), so
+/// that each refusal names them and every bound is the table's.
 #pragma once
 
 #include "reference/scene.hpp"
-#include "reference/scene_file.hpp"
+#include "reference/scene_format.hpp"
 
 #include <nlohmann/json.hpp>
 
-#include <limits>
-#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace decant {
-
-/// Which finite numbers are allowed.
-struct Range {
-  double low = -std::numeric_limits<double>::infinity();
-  double high = std::numeric_limits<double>::infinity();
-  bool low_open = false;  // true: `low` itself is refused
-
-  bool holds(double value) const { return (low_open ? value > low : value >= low) && value <= high; }
-  /// As a reader of a message wants it: "a number > 0".
-  std::string text() const;
-};
 
 /// A double as the shortest text that reads back to it.
 std::string to_text(double value);
@@ -33,28 +21,33 @@ std::string to_text(double value);
 /// The value to five significant digits, for messages.
 double rounded(double value);
 
-/// One value of a JSON document and where it stands. Does not own the document.
+/// One value of a JSON document, where it stands, and what it may be. Owns neither document nor format. To ask
+/// for another type than the format's is a mistake of the caller: std::bad_variant_access; for a key that the
+/// format lacks: std::logic_error.
 class JsonValue {
  public:
-  JsonValue(const nlohmann::json& json, std::string file, std::string path)
-      : json_(&json), file_(std::move(file)), path_(std::move(path)) {}
+  JsonValue(const nlohmann::json& json, const ValueFormat& format, std::string file, std::string path)
+      : json_(&json), format_(&format), file_(std::move(file)), path_(std::move(path)) {}
 
   /// Throws InputError unless this is an object that holds every required key and no unknown one.
-  void check_keys(const ObjectKeys& keys) const;
+  void check_keys() const;
 
-  bool has(const std::string& key) const { return json_->contains(key); }
+  /// Throws InputError unless of the object's alternatives as many stand here as must.
+  void check_alternatives() const;
+
+  bool has(const std::string& key) const;
 
   /// The member of that name; the caller has made sure that it exists.
   JsonValue operator[](const std::string& key) const;
 
-  /// The elements of an array of at least `fewest` and at most `most`. Throws InputError.
-  std::vector<JsonValue> elements(std::size_t fewest, std::size_t most) const;
+  /// The elements of an array. Throws InputError where they are too few or too many.
+  std::vector<JsonValue> elements() const;
 
-  /// A finite number in the range. Throws InputError.
-  double number(const Range& range) const;
+  /// A finite number in its range. Throws InputError.
+  double number() const;
 
-  /// An integer in low … high, written without a fraction. Throws InputError.
-  int integer(int low, int high) const;
+  /// An integer in its range, written without a fraction. Throws InputError.
+  int integer() const;
 
   /// true or false. Throws InputError.
   bool boolean() const;
@@ -62,26 +55,30 @@ class JsonValue {
   /// Text. Throws InputError.
   std::string text() const;
 
-  /// Text fit for a name: letters, digits, '.', '-', '_', 1 to 64 of them. Throws InputError.
+  /// Text fit for a name (NameFormat). Throws InputError.
   std::string name() const;
 
-  /// Which of the given texts this is, as an index. Throws InputError.
-  std::size_t choice(const std::vector<std::string>& options) const;
+  /// Which of its options this is, as an index. Throws InputError.
+  std::size_t choice() const;
 
-  /// Three numbers in the range. Throws InputError.
-  Vec3 vector(const Range& range) const;
+  /// An array of three numbers. Throws InputError.
+  Vec3 vector() const;
 
   const std::string& path() const { return path_; }
   const std::string& file() const { return file_; }
-
-  /// The value as a message shows it: one line, shortened where long.
-  std::string shown() const;
 
   /// Throws InputError for this value.
   [[noreturn]] void refuse(const std::string& bound) const;
 
  private:
+  template <class Type>
+  const Type& type() const {
+    return std::get<Type>(format_->type);
+  }
+  const ObjectFormat& object() const { return object_format(type<ObjectReference>().name); }
+
   const nlohmann::json* json_;
+  const ValueFormat* format_;
   std::string file_, path_;
 };
 
