@@ -1,9 +1,11 @@
 /// \file
-/// What the two halves of hdf5_io share: identifiers that close themselves, and HDF5's own words.
+/// What everything that calls HDF5 shares: identifiers that close themselves, HDF5's own words, and how groups,
+/// datasets, attributes and files are made.
 #pragma once
 
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <hdf5.h>
 
@@ -72,6 +74,41 @@ inline bool make_group(hid_t file, const std::string& path) {
       return false;
   }
   return true;
+}
+
+/// Dataspace of that shape; a scalar's where it has no axis.
+inline Handle space_of(const std::vector<hsize_t>& shape) {
+  return Handle(shape.empty() ? H5Screate(H5S_SCALAR)
+                              : H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr));
+}
+
+/// Fixed-length UTF-8 of `size` bytes. \param padding  what stands after a shorter text
+inline Handle utf8_type(std::size_t size, H5T_str_t padding = H5T_STR_NULLPAD) {
+  Handle type(H5Tcopy(H5T_C_S1));
+  H5Tset_size(type.get(), size);
+  H5Tset_cset(type.get(), H5T_CSET_UTF8);
+  H5Tset_strpad(type.get(), padding);
+  return type;
+}
+
+/// Makes a dataset, and groups above it where they are missing, and writes no value; an empty handle where HDF5
+/// refuses. No time of writing is kept.
+/// \param creation  a dataset creation list, which this sets up further
+inline Handle make_dataset(hid_t file, const std::string& path, hid_t type, const std::vector<hsize_t>& shape,
+                           const Handle& creation) {
+  H5Pset_obj_track_times(creation.get(), false);
+  if (!make_group(file, parent_path(path))) return Handle(-1);
+  return Handle(H5Dcreate2(file, path.c_str(), type, space_of(shape).get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT));
+}
+
+/// Writes one attribute of what stands at a path; false where HDF5 refuses.
+/// \param shape  as of space_of
+inline bool write_attribute(hid_t file, const std::string& object, const std::string& name, hid_t type, hid_t memory,
+                            const void* value, const std::vector<hsize_t>& shape = {}) {
+  const Handle owner(H5Oopen(file, object.c_str(), H5P_DEFAULT));
+  if (!owner) return false;
+  const Handle attribute(H5Acreate2(owner.get(), name.c_str(), type, space_of(shape).get(), H5P_DEFAULT, H5P_DEFAULT));
+  return attribute && H5Awrite(attribute.get(), memory, value) >= 0;
 }
 
 /// Creates a file in the format of HDF5 1.8, the first whose object headers carry checksums (later

@@ -15,15 +15,6 @@ namespace {
 constexpr hsize_t values_per_chunk = 65536;
 constexpr std::size_t memory_step = 1 << 22;  // bytes the image grows by
 
-/// Fixed-length UTF-8 of `size` bytes.
-Handle utf8_type(std::size_t size) {
-  Handle type(H5Tcopy(H5T_C_S1));
-  H5Tset_size(type.get(), size);
-  H5Tset_cset(type.get(), H5T_CSET_UTF8);
-  H5Tset_strpad(type.get(), H5T_STR_NULLPAD);
-  return type;
-}
-
 }  // namespace
 
 struct Hdf5Writer::Layout {
@@ -51,11 +42,8 @@ void Hdf5Writer::fail(const std::string& object, const std::string& what) const 
 void Hdf5Writer::dataset(const std::string& path, const Layout& layout, const void* values, std::string_view unit,
                          std::string_view description) {
   const auto& dims = layout.dims;
-  const Handle space(dims.empty() ? H5Screate(H5S_SCALAR)
-                                  : H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr));
   const bool holds_values = std::find(dims.begin(), dims.end(), hsize_t{0}) == dims.end();
   const Handle creation(H5Pcreate(H5P_DATASET_CREATE));
-  H5Pset_obj_track_times(creation.get(), false);
   if (holds_values && !dims.empty() && level_ > 0) {
     std::vector<hsize_t> chunk = dims;
     chunk[0] = std::min(dims[0], values_per_chunk / (dims.size() > 1 ? dims[1] : 1));
@@ -63,9 +51,7 @@ void Hdf5Writer::dataset(const std::string& path, const Layout& layout, const vo
     H5Pset_shuffle(creation.get());
     H5Pset_deflate(creation.get(), static_cast<unsigned>(level_));
   }
-  group(parent_path(path));
-  const Handle data(
-      H5Dcreate2(id_, path.c_str(), layout.file_type, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT));
+  const Handle data = make_dataset(id_, path, layout.file_type, dims, creation);
   if (!data) fail(path, hdf5_message());
   if (holds_values && H5Dwrite(data.get(), layout.memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0)
     fail(path, hdf5_message());
@@ -125,21 +111,6 @@ void Hdf5Writer::group(const std::string& path) {
   if (!make_group(id_, path)) fail(path, hdf5_message());
 }
 
-namespace {
-
-/// Writes one attribute of what stands at a path, a scalar where no length is given; false where
-/// HDF5 refuses.
-bool write_attribute(hid_t file, const std::string& object, const std::string& name, hid_t type, hid_t memory,
-                     const void* value, hsize_t length = 0) {
-  const Handle owner(H5Oopen(file, object.c_str(), H5P_DEFAULT));
-  const Handle space(length > 0 ? H5Screate_simple(1, &length, nullptr) : H5Screate(H5S_SCALAR));
-  if (!owner) return false;
-  const Handle attribute(H5Acreate2(owner.get(), name.c_str(), type, space.get(), H5P_DEFAULT, H5P_DEFAULT));
-  return attribute && H5Awrite(attribute.get(), memory, value) >= 0;
-}
-
-}  // namespace
-
 void Hdf5Writer::attribute(const std::string& object, const std::string& name, std::string_view text) {
   const std::string whole = text.empty() ? std::string(1, '\0') : std::string(text);
   if (text.find('\0') != std::string_view::npos) fail(object + "@" + name, "a string holds NUL");
@@ -164,7 +135,7 @@ void Hdf5Writer::attribute(const std::string& object, const std::string& name, s
 void Hdf5Writer::attribute(const std::string& object, const std::string& name,
                            const std::vector<std::int64_t>& values) {
   group(object);
-  if (!write_attribute(id_, object, name, H5T_STD_I64LE, H5T_NATIVE_INT64, values.data(), values.size()))
+  if (!write_attribute(id_, object, name, H5T_STD_I64LE, H5T_NATIVE_INT64, values.data(), {values.size()}))
     fail(object + "@" + name, hdf5_message());
 }
 

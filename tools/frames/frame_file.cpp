@@ -72,45 +72,34 @@ std::vector<DatasetPlan> plan(const FrameLayout& layout) {
   fail(file, fmt::format("{}: {}", what, std::generic_category().message(errno)));
 }
 
-/// UTF-8 of `size` bytes.
-Handle text_type(std::size_t size) {
-  Handle type(H5Tcopy(H5T_C_S1));
-  H5Tset_size(type.get(), size);
-  H5Tset_cset(type.get(), H5T_CSET_UTF8);
-  return type;
-}
+/// The type of a text in this file, which ends with NUL.
+Handle text_type(const std::string& text) { return utf8_type(text.size() + 1, H5T_STR_NULLTERM); }
 
-void put_text(hid_t object, const std::string& name, const std::string& text) {
-  const Handle type = text_type(text.size() + 1), space(H5Screate(H5S_SCALAR));
-  const Handle attribute(H5Acreate2(object, name.c_str(), type.get(), space.get(), H5P_DEFAULT, H5P_DEFAULT));
-  if (!attribute || H5Awrite(attribute.get(), type.get(), text.c_str()) < 0)
+void put_text(hid_t file, const std::string& object, const std::string& name, const std::string& text) {
+  const Handle type = text_type(text);
+  if (!write_attribute(file, object, name, type.get(), type.get(), text.c_str()))
     throw std::runtime_error("attribute " + name + ": " + hdf5_message());
 }
 
 /// The scene goes into a dataset, because an attribute holds 64 kB at most.
 void put_scene(hid_t file, const Scene& scene) {
   const std::string text = scene_to_json(scene);
-  const Handle type = text_type(text.size() + 1), space(H5Screate(H5S_SCALAR));
-  const Handle creation(H5Pcreate(H5P_DATASET_CREATE));
-  H5Pset_obj_track_times(creation.get(), false);
-  const Handle dataset(H5Dcreate2(file, "/scene", type.get(), space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT));
+  const Handle type = text_type(text);
+  const Handle dataset = make_dataset(file, "/scene", type.get(), {}, Handle(H5Pcreate(H5P_DATASET_CREATE)));
   if (!dataset || H5Dwrite(dataset.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, text.c_str()) < 0)
     throw std::runtime_error("dataset /scene: " + hdf5_message());
 }
 
-std::uint64_t create_dataset(hid_t file, const DatasetPlan& d) {
+/// Gives a dataset its place in the file, and returns where that begins.
+std::uint64_t lay_out(hid_t file, const DatasetPlan& d) {
   const Handle creation(H5Pcreate(H5P_DATASET_CREATE));
   H5Pset_layout(creation.get(), H5D_CONTIGUOUS);
   H5Pset_alloc_time(creation.get(), H5D_ALLOC_TIME_EARLY);
   H5Pset_fill_time(creation.get(), H5D_FILL_TIME_NEVER);
-  // Two pours of the same scene are to give the same file.
-  H5Pset_obj_track_times(creation.get(), false);
-  const Handle space(H5Screate_simple(static_cast<int>(d.shape.size()), d.shape.data(), nullptr));
-  if (!make_group(file, parent_path(d.path))) throw std::runtime_error("dataset " + d.path + ": " + hdf5_message());
-  const Handle dataset(H5Dcreate2(file, d.path.c_str(), d.type, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT));
+  const Handle dataset = make_dataset(file, d.path, d.type, d.shape, creation);
   if (!dataset) throw std::runtime_error("dataset " + d.path + ": " + hdf5_message());
-  if (!d.unit.empty()) put_text(dataset.get(), "unit", d.unit);
-  put_text(dataset.get(), "description", d.description);
+  if (!d.unit.empty()) put_text(file, d.path, "unit", d.unit);
+  put_text(file, d.path, "description", d.description);
   const haddr_t offset = H5Dget_offset(dataset.get());
   if (offset == HADDR_UNDEF && d.bytes() > 0)
     throw std::runtime_error("dataset " + d.path + ": has no place in the file");
@@ -213,9 +202,9 @@ FrameFile FrameFile::create(const std::filesystem::path& file, const Scene& scen
     const Handle access = without_locks();
     const Handle id = create_file(file.string(), access);
     if (!id) throw std::runtime_error("cannot be created: " + hdf5_message());
-    for (const auto& [name, text] : texts) put_text(id.get(), name, text);
+    for (const auto& [name, text] : texts) put_text(id.get(), "/", name, text);
     put_scene(id.get(), scene);
-    for (const DatasetPlan& d : plan(layout)) out.offset_[d.path] = create_dataset(id.get(), d);
+    for (const DatasetPlan& d : plan(layout)) out.offset_[d.path] = lay_out(id.get(), d);
   } catch (const std::runtime_error& error) {
     fail(file, error.what());
   }

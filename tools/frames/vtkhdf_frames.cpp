@@ -83,21 +83,13 @@ class VtkHdf {
   }
 
  private:
-  static Handle space_of(const Shape& shape) {
-    return Handle(H5Screate_simple(static_cast<int>(shape.size()), shape.data(), nullptr));
-  }
-
   /// Never written: 0 is what HDF5 fills with.
   void zeros(const std::string& path, const Shape& shape) {
     create(path, H5T_STD_I64LE, shape, Handle(H5Pcreate(H5P_DATASET_CREATE)));
   }
 
   void create(const std::string& path, hid_t type, const Shape& shape, const Handle& creation) {
-    H5Pset_obj_track_times(creation.get(), false);
-    out_.group(parent_path(path));
-    const Handle space(space_of(shape));
-    if (!Handle(H5Dcreate2(out_.id(), path.c_str(), type, space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT)))
-      fail(path);
+    if (!make_dataset(out_.id(), path, type, shape, creation)) fail(path);
   }
 
   [[noreturn]] void fail(const std::string& path) const {
