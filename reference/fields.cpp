@@ -92,7 +92,7 @@ void evaluate(const Scene& scene, const ParticleState& state, const PosedWalls& 
   const Matrix x = state.position.cast<Real>(), v = state.velocity.cast<Real>();
   const Matrix x_wall = walls.position.cast<Real>(), v_wall = walls.velocity.cast<Real>();
   using Column = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
-  const Column V = volumes.cast<Real>();
+  const Column& V = volumes.cast<Real>();  // no copy where Real is double
   const auto fluid_of = [&](Eigen::Index i) -> const auto& { return neighbors.fluid[static_cast<std::size_t>(i)]; };
   const auto wall_of = [&](Eigen::Index i) -> const auto& { return neighbors.wall[static_cast<std::size_t>(i)]; };
 

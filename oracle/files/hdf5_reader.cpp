@@ -155,7 +155,8 @@ void check_storage(const Hdf5Reader& reader, const std::string& path, const Data
   H5Pget_chunk(plist.get(), static_cast<int>(chunk.size()), chunk.data());
   double expected = 1, chunk_bytes = static_cast<double>(H5Tget_size(data.type.get()));
   for (std::size_t k = 0; k < chunk.size(); ++k) {
-    expected *= static_cast<double>((data.dims[k] + chunk[k] - 1) / chunk[k]);
+    const hsize_t along_axis = (data.dims[k] + chunk[k] - 1) / chunk[k];
+    expected *= static_cast<double>(along_axis);
     chunk_bytes *= static_cast<double>(chunk[k]);
   }
   hsize_t chunks = 0;

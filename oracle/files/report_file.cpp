@@ -131,7 +131,7 @@ void write_checks(Hdf5Writer& out, const std::vector<CheckRow>& rows) {
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const CheckRow& row = rows[k];
     if (verdict_of(row) != Verdict::fail || !has_arrays(row)) continue;
-    const std::int64_t bytes = 2 * 4 * row.errors.size() + 4096;
+    const std::int64_t bytes = row.errors.size() * 2 * 4 + 4096;
     const bool whole = bytes <= budget;
     if (whole) budget -= bytes;
     if (!whole && worst_left-- <= 0) continue;

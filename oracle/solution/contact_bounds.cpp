@@ -30,8 +30,8 @@ double turn_of_normal(const SolidDistance& solid, const Vec3& local, const Surfa
     for (double side : {-2.0, 2.0}) ask(side * e * Vec3::Unit(a));
   if (std::abs(surface.distance) > 4 * e) return turn;
   for (int k = 0; k < 27; ++k) {
-    const Vec3 way(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
-    for (double far : {0.25, 1.0, 2.0}) ask(far * e * way);
+    const Eigen::Vector3i way(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
+    for (double far : {0.25, 1.0, 2.0}) ask(far * e * way.cast<double>());
   }
   return turn;
 }

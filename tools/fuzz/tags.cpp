@@ -79,7 +79,7 @@ Tags tags_of(const Fixture& fixture) {
   std::set<std::tuple<double, double, double>> places;
   // Cells begin where the fluid does.
   const Vec3 lowest = x.cols() > 0 ? Vec3(x.rowwise().minCoeff()) : Vec3::Zero();
-  int on_faces = 0;
+  Eigen::Index on_faces = 0;
   for (Eigen::Index i = 0; i < x.cols(); ++i) {
     const auto k = static_cast<std::size_t>(i);
     if (near.fluid[k].empty() && near.wall[k].empty()) set("isolated");
