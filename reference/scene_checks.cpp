@@ -9,6 +9,8 @@
 #include "reference/scene_json_reader.hpp"
 #include "reference/sweep.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -19,7 +21,7 @@ namespace {
 std::string at(const std::string& list, std::size_t index) { return list + "[" + std::to_string(index) + "]"; }
 
 std::string point_text(const Vec3& x) {
-  return "(" + to_text(rounded(x.x())) + ", " + to_text(rounded(x.y())) + ", " + to_text(rounded(x.z())) + ")";
+  return fmt::format("({}, {}, {})", to_text(rounded(x.x())), to_text(rounded(x.y())), to_text(rounded(x.z())));
 }
 
 /// Lengths are compared with this much slack, so that decimal fractions that meet do meet.

@@ -5,6 +5,8 @@
 
 #include "reference/scene_format.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <cstdint>
 
@@ -102,12 +104,16 @@ void write_object(const ObjectFormat& object, json& out) {
   }
 }
 
+std::string in_brackets(const json& value, const std::string& inside) {
+  return value.is_object() ? fmt::format("{{{}}}", inside) : fmt::format("[{}]", inside);
+}
+
 std::string on_one_line(const json& value) {
   if (!value.is_structured()) return value.dump();
   std::string inside;
   for (const auto& [key, item] : value.items())
     inside += (inside.empty() ? "" : ", ") + (value.is_object() ? json(key).dump() + ": " : "") + on_one_line(item);
-  return value.is_object() ? "{" + inside + "}" : "[" + inside + "]";
+  return in_brackets(value, inside);
 }
 
 /// \param indent  columns before the line; \param taken  columns of it that are not the value's
@@ -120,8 +126,8 @@ std::string laid_out(const json& value, std::size_t indent, std::size_t taken) {
     inside += (inside.empty() ? "\n" : ",\n") + std::string(indent + 2, ' ') + before +
               laid_out(item, indent + 2, before.size() + 1);
   }
-  inside += "\n" + std::string(indent, ' ');
-  return value.is_object() ? "{" + inside + "}" : "[" + inside + "]";
+  inside.append(1, '\n').append(indent, ' ');
+  return in_brackets(value, inside);
 }
 
 }  // namespace
