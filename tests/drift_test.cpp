@@ -32,17 +32,17 @@ const Fixture& splash() {
   return fixture;
 }
 
-DriftPlan plan_of(const std::vector<int>& intervals, const std::vector<double>& skins, int window, bool timed) {
-  return {all_lists(intervals, skins), window, timed};
+drift::Plan plan_of(const std::vector<int>& intervals, const std::vector<double>& skins, int window, bool timed) {
+  return {drift::all_lists(intervals, skins), window, timed};
 }
 
-const DriftResult& measured() {
-  static const DriftResult result = measure_drift(splash(), plan_of({1, 4, 12}, {0, 0.4}, 12, true), list_on_host);
+const drift::Result& measured() {
+  static const drift::Result result = drift::measure(splash(), plan_of({1, 4, 12}, {0, 0.4}, 12, true), list_on_host);
   return result;
 }
 
-const DriftRow& row(int interval, double skin) {
-  for (const DriftRow& r : measured().rows)
+const drift::Row& row(int interval, double skin) {
+  for (const drift::Row& r : measured().rows)
     if (r.list.interval == interval && (interval == 0 || r.list.skin == skin)) return r;
   throw std::out_of_range("no such row");
 }
@@ -66,8 +66,8 @@ TEST(Drift, GrowsWithTheIntervalAndShrinksWithTheSkin) {
 }
 
 TEST(Drift, NothingIsMissedBeforeDisplacementsAllowIt) {
-  for (const DriftRow& r : measured().rows) EXPECT_LE(r.proved_until, r.first_miss) << r.list.interval;
-  for (const SafeInterval& safe : measured().safe) {
+  for (const drift::Row& r : measured().rows) EXPECT_LE(r.proved_until, r.first_miss) << r.list.interval;
+  for (const drift::SafeInterval& safe : measured().safe) {
     EXPECT_GE(safe.measured, 1);
     EXPECT_LE(safe.proved, safe.measured);
     EXPECT_LE(safe.expected, safe.expected_relative);
@@ -77,7 +77,7 @@ TEST(Drift, NothingIsMissedBeforeDisplacementsAllowIt) {
 }
 
 TEST(Drift, OfOneListIsTheSameWhateverElseIsMeasured) {
-  const DriftResult alone = measure_drift(splash(), plan_of({4}, {0}, 12, false), list_on_host);
+  const drift::Result alone = drift::measure(splash(), plan_of({4}, {0}, 12, false), list_on_host);
   EXPECT_EQ(alone.rows[0].missed_share, row(4, 0).missed_share);
   EXPECT_EQ(alone.rows[0].acceleration_rms, row(4, 0).acceleration_rms);
   EXPECT_EQ(alone.samples.size(), 12u);
@@ -85,7 +85,7 @@ TEST(Drift, OfOneListIsTheSameWhateverElseIsMeasured) {
 
 TEST(Drift, TimesAndFollowsEveryList) {
   EXPECT_EQ(measured().rows.size(), 7u);
-  for (const DriftRow& r : measured().rows) {
+  for (const drift::Row& r : measured().rows) {
     EXPECT_GT(r.substep_us, 0);
     EXPECT_GE(r.deviation, 0);
     EXPECT_GE(r.momentum_drift, 0);
@@ -98,12 +98,12 @@ TEST(Drift, TheSkinThatTheoryAsksForKeepsTheTolerance) {
   for (const char* phase : {"splash", "filling"}) {
     const Fixture fixture = recorded(phase);
     for (const double tolerance : {1e-2, 1e-4}) {
-      DriftPlan plan{derived_lists({fixture}, {10}, tolerance), 20, false};
+      drift::Plan plan{drift::derived_lists({fixture}, {10}, tolerance), 20, false};
       ASSERT_EQ(plan.lists.size(), 1u);
       const double skin = plan.lists[0].skin;
       EXPECT_LT(skin, 0.5);
       plan.lists.push_back({10, 0, false});
-      const DriftResult result = measure_drift(fixture, plan, list_on_host);
+      const drift::Result result = drift::measure(fixture, plan, list_on_host);
       // Theory knows the window's first state only.
       EXPECT_LT(result.rows[0].acceleration_rms, 2 * tolerance) << phase << " " << tolerance;
       // Nor does it ask for much more than is needed.
@@ -113,9 +113,9 @@ TEST(Drift, TheSkinThatTheoryAsksForKeepsTheTolerance) {
 }
 
 TEST(Drift, RecommendsWhatIsWithinTheTolerance) {
-  std::vector<DriftResult> made(1);
+  std::vector<drift::Result> made(1);
   const auto add = [&](int interval, double skin, double error, double us) {
-    DriftRow r;
+    drift::Row r;
     r.list = {interval, skin, false};
     r.acceleration_rms = error;
     r.substep_us = us;
@@ -125,39 +125,39 @@ TEST(Drift, RecommendsWhatIsWithinTheTolerance) {
   add(10, 0, 1e-2, 40);
   add(10, 0.2, 1e-5, 50);
   add(0, NAN, 0, 60);
-  EXPECT_EQ(recommend(made, 1e-1)->substep_us, 40);
-  EXPECT_EQ(recommend(made, 2e-2)->substep_us, 40);
-  EXPECT_EQ(recommend(made, 1.9e-2)->substep_us, 50);  // half the tolerance is kept back
-  EXPECT_EQ(recommend(made, 1e-3)->list.skin, 0.2);
-  EXPECT_EQ(recommend(made, 1e-3)->adaptive_us, 60);
-  EXPECT_EQ(recommend(made, 1e-3)->next_error, 1e-2);
-  EXPECT_EQ(recommend(made, 1e-7)->list.interval, 0);
+  EXPECT_EQ(drift::recommend(made, 1e-1)->substep_us, 40);
+  EXPECT_EQ(drift::recommend(made, 2e-2)->substep_us, 40);
+  EXPECT_EQ(drift::recommend(made, 1.9e-2)->substep_us, 50);  // half the tolerance is kept back
+  EXPECT_EQ(drift::recommend(made, 1e-3)->list.skin, 0.2);
+  EXPECT_EQ(drift::recommend(made, 1e-3)->adaptive_us, 60);
+  EXPECT_EQ(drift::recommend(made, 1e-3)->next_error, 1e-2);
+  EXPECT_EQ(drift::recommend(made, 1e-7)->list.interval, 0);
   // What is good in one phase has to be good in all of them.
   made.push_back(made[0]);
   made[1].rows[2].acceleration_rms = 1e-2;
-  EXPECT_EQ(recommend(made, 1e-3)->list.interval, 0);
+  EXPECT_EQ(drift::recommend(made, 1e-3)->list.interval, 0);
   made[1].rows[3].acceleration_rms = NAN;
-  EXPECT_EQ(recommend(made, 1e-3)->list.interval, 1);
-  EXPECT_EQ(recommend({}, 1), nullptr);
+  EXPECT_EQ(drift::recommend(made, 1e-3)->list.interval, 1);
+  EXPECT_EQ(drift::recommend({}, 1), nullptr);
 }
 
 TEST(Drift, HoldsOnStatesThatTheRecommendationHasNotSeen) {
   constexpr double tolerance = 1e-2;
-  std::vector<DriftResult> seen;
+  std::vector<drift::Result> seen;
   for (const char* phase : {"splash", "filling"}) {
-    seen.push_back(measure_drift(recorded(phase), plan_of({1, 5, 10}, {0, 0.1, 0.2}, 12, false), list_on_host));
+    seen.push_back(drift::measure(recorded(phase), plan_of({1, 5, 10}, {0, 0.1, 0.2}, 12, false), list_on_host));
     // Times as they are on a GPU: a rebuild costs as much as two substeps.
-    for (DriftRow& r : seen.back().rows) r.substep_us = 10 + 20.0 / r.list.interval + 20 * r.list.skin;
-    DriftRow adaptive;
-    adaptive.list = {0, not_measured, false};
+    for (drift::Row& r : seen.back().rows) r.substep_us = 10 + 20.0 / r.list.interval + 20 * r.list.skin;
+    drift::Row adaptive;
+    adaptive.list = {0, drift::not_measured, false};
     adaptive.substep_us = 25;
     seen.back().rows.push_back(adaptive);
   }
-  const auto best = recommend(seen, tolerance);
+  const auto best = drift::recommend(seen, tolerance);
   ASSERT_NE(best, nullptr);
   EXPECT_GT(best->list.interval, 1);
   for (const char* phase : {"tilt-onset", "stream", "dense-walls-stream", "rest"}) {
-    const DriftResult unseen = measure_drift(recorded(phase), {{best->list}, 20, false}, list_on_host);
+    const drift::Result unseen = drift::measure(recorded(phase), {{best->list}, 20, false}, list_on_host);
     EXPECT_LE(unseen.rows[0].acceleration_rms, tolerance) << phase;
   }
 }
@@ -168,7 +168,7 @@ TEST(Drift, AlongAPourLooksJustBeforeEachRebuildAndPassesThePhases) {
   phases[0].state.substep = 31;
   phases[1].state.substep = 7;
   test::FallingPoints points;
-  const PourDrift pour = along_pour(
+  const drift::PourResult pour = drift::along_pour(
       scene, plan_of({1, 6}, {0}, 10, false), 5,
       [](const std::string&) { return std::make_unique<test::FallingPoints>(); }, phases);
   ASSERT_EQ(pour.moments.size(), 10u);
@@ -185,8 +185,8 @@ TEST(Drift, OfWholePoursIsNothingForTheSameListAndSomethingForAnother) {
   Scene scene = test::falling_points_scene(40);
   int made = 0;
   int parts = 0;
-  std::vector<WholePour> pours;
-  whole_pours(
+  std::vector<drift::WholePour> pours;
+  drift::whole_pours(
       scene, plan_of({5}, {0}, 10, false), 2,
       [&](const std::string& o) {
         auto backend = std::make_unique<test::FallingPoints>();
@@ -217,12 +217,12 @@ TEST(Drift, ReportIsAsDocumented) {
   if (!test::python_has("h5py")) GTEST_SKIP() << "no h5py in " << test::python();
   const test::TemporaryFolder folder;
   const auto file = folder / "drift.h5";
-  PourDrift pour{"scene", {{0.5, measured().samples[3]}}, {WholePour{}}};
-  for (const auto& pours : {std::vector<PourDrift>{}, std::vector{pour}}) {
-    write_drift(file, {measured()}, pours, {"list", "", "host", "here", "fp32"});
+  drift::PourResult pour{"scene", {{0.5, measured().samples[3]}}, {drift::WholePour{}}};
+  for (const auto& pours : {std::vector<drift::PourResult>{}, std::vector{pour}}) {
+    drift::write(file, {measured()}, pours, {"list", "", "host", "here", "fp32"});
     EXPECT_EQ(test::run_python({DECANT_SOURCE_DIR "/tools/python/check_schema.py", file.string()}), 0);
   }
-  const std::string table = drift_table({measured()});
+  const std::string table = drift::table({measured()});
   EXPECT_NE(table.find("safe interval"), std::string::npos);
 }
 
@@ -271,9 +271,9 @@ class Series : public testing::Test {
     out_->integers(path + "_count", count);
     out_->integers(path, Eigen::Map<IdVector>(all.data(), static_cast<Eigen::Index>(all.size())));
   }
-  DriftResult read() {
+  drift::Result read() {
     out_->commit();
-    return measure_series(fixture_, file_);
+    return drift::measure_series(fixture_, file_);
   }
   /// What is said of it.
   std::string complaint() {
@@ -298,7 +298,7 @@ TEST_F(Series, IsLookedAtAsOurOwnListsAre) {
   write_states({0, 0, 1, 1});
   write_list(0, 0, instants_[0].near);
   write_list(1, 2, instants_[2].near);
-  const DriftResult result = read();
+  const drift::Result result = read();
   ASSERT_EQ(result.samples.size(), 4u);
   for (const std::size_t built : {0u, 2u}) {
     const StaleList own(fixture_.scene, volumes_.volume, instants_[built], 0);

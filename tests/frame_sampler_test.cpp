@@ -58,19 +58,19 @@ TEST(WorkThread, HandsOnAFailureAndDoesNothingAfterIt) {
 TEST(FrameSampler, WorksWhileTheSolverDoesAndIsOneFrameBehindAtMost) {
   const Scene scene = test::falling_points_scene(3);
   const auto state = std::make_shared<const ParticleState>(initial_state(scene));
-  const FrameLayout layout = frame_layout(scene, state->size());
+  const frames::Layout layout = frames::layout_of(scene, state->size());
   FallingPoints backend;
   backend.load(scene, {}, *state);
   Fields fields = Fields::unwritten(state->size(), 0);
   ASSERT_TRUE(backend.evaluate(fields, nullptr).ok());
   std::promise<void> solver_goes_on;
   std::atomic<std::int64_t> written = 0, told = 0;
-  FrameSampler samples(scene, layout,
-                       {[&](const Frame& frame) {
-                          if (frame.index == 0) solver_goes_on.get_future().wait();
-                          if (frame.index == 2) throw std::runtime_error("the disk is full");
-                        },
-                        [&](const Frame&) { ++written; }, [&](const TimelineRow&) { ++told; }});
+  pour::FrameSampler samples(scene, layout,
+                             {[&](const frames::Frame& frame) {
+                                if (frame.index == 0) solver_goes_on.get_future().wait();
+                                if (frame.index == 2) throw std::runtime_error("the disk is full");
+                              },
+                              [&](const frames::Frame&) { ++written; }, [&](const pour::TimelineRow&) { ++told; }});
   samples.end_of_frame(state, fields, {0, 0.0, 0.0});
   EXPECT_EQ(written, 0);
   solver_goes_on.set_value();
@@ -88,8 +88,9 @@ TEST(FrameSampler, WorksWhileTheSolverDoesAndIsOneFrameBehindAtMost) {
 TEST(FrameSampler, GivesFieldsInWhichNothingIsWritten) {
   const Scene scene = test::falling_points_scene(3);
   const auto state = std::make_shared<const ParticleState>(initial_state(scene));
-  const FrameLayout layout = frame_layout(scene, state->size());
-  FrameSampler samples(scene, layout, {[](const Frame&) {}, [](const Frame&) {}, [](const TimelineRow&) {}});
+  const frames::Layout layout = frames::layout_of(scene, state->size());
+  pour::FrameSampler samples(
+      scene, layout, {[](const frames::Frame&) {}, [](const frames::Frame&) {}, [](const pour::TimelineRow&) {}});
   const Eigen::Index n = state->size();
   for (std::int64_t frame = 0; frame < 3; ++frame) {
     Fields fields = samples.unwritten(n, 11);

@@ -27,7 +27,7 @@ using test::TemporaryFolder;
 constexpr std::int64_t particles = 7;
 
 /// Floats that need all their digits, tiny, huge, negative zero among them.
-Frame awkward_frame(const Scene& scene, const FrameLayout& layout, std::int64_t index) {
+frames::Frame awkward_frame(const Scene& scene, const frames::Layout& layout, std::int64_t index) {
   ParticleState state;
   state.substep = index * scene.schedule.substeps_per_frame;
   state.position.setRandom(3, particles);
@@ -39,7 +39,7 @@ Frame awkward_frame(const Scene& scene, const FrameLayout& layout, std::int64_t 
   Fields fields = Fields::unwritten(particles, 0);
   fields.density.setConstant(1000.0 / 3.0);
   fields.pressure.setLinSpaced(particles, -1.0, 1.0);
-  Frame frame = make_frame(scene, layout, index, state, fields);
+  frames::Frame frame = frames::make_frame(scene, layout, index, state, fields);
   frame.place.assign(particles, static_cast<std::uint8_t>(Region::receiver));
   return frame;
 }
@@ -77,10 +77,10 @@ std::vector<float> floats_of(const std::filesystem::path& file, const std::strin
 TEST(FrameFile, GivesBackEveryFloatOfEveryFrame) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene(3);
-  const FrameLayout layout = frame_layout(scene, particles);
-  const Frame frame = awkward_frame(scene, layout, 2);
+  const frames::Layout layout = frames::layout_of(scene, particles);
+  const frames::Frame frame = awkward_frame(scene, layout, 2);
   {
-    FrameFile file = FrameFile::create(folder / "f.h5", scene, layout, {});
+    frames::File file = frames::File::create(folder / "f.h5", scene, layout, {});
     file.write(frame);
   }
   const auto position = floats_of(folder / "f.h5", "/fluid/position");
@@ -100,8 +100,8 @@ TEST(FrameFile, GivesBackEveryFloatOfEveryFrame) {
 TEST(FrameFile, TellsWrittenFramesFromUnwrittenOnesByTheirTime) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene(3);
-  const FrameLayout layout = frame_layout(scene, particles);
-  FrameFile file = FrameFile::create(folder / "f.h5", scene, layout, {});
+  const frames::Layout layout = frames::layout_of(scene, particles);
+  frames::File file = frames::File::create(folder / "f.h5", scene, layout, {});
   file.write(awkward_frame(scene, layout, 1));
   const Eigen::VectorXd time = Hdf5Reader(folder / "f.h5").vector("/time", 4);
   EXPECT_TRUE(std::isnan(time[0]));
@@ -112,36 +112,36 @@ TEST(FrameFile, TellsWrittenFramesFromUnwrittenOnesByTheirTime) {
 TEST(FrameFile, CallsAFrameWrittenOnlyWhenItIsComplete) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene(3);
-  const FrameLayout layout = frame_layout(scene, particles);
-  Frame frame = awkward_frame(scene, layout, 1);
+  const frames::Layout layout = frames::layout_of(scene, particles);
+  frames::Frame frame = awkward_frame(scene, layout, 1);
   const auto places = std::exchange(frame.place, {});
-  FrameFile file = FrameFile::create(folder / "f.h5", scene, layout, {});
+  frames::File file = frames::File::create(folder / "f.h5", scene, layout, {});
   file.write_values(frame);
   EXPECT_TRUE(std::isnan(Hdf5Reader(folder / "f.h5").vector("/time", 4)[1]));
   EXPECT_THROW(file.complete(frame), std::runtime_error);
   frame.place = places;
   file.complete(frame);
   EXPECT_EQ(Hdf5Reader(folder / "f.h5").vector("/time", 4)[1], frame.time);
-  FrameFile::create(folder / "whole.h5", scene, layout, {}).write(frame);
+  frames::File::create(folder / "whole.h5", scene, layout, {}).write(frame);
   EXPECT_TRUE(text_of(folder / "f.h5") == text_of(folder / "whole.h5"));
 }
 
 TEST(FrameFile, KeepsASecondPourOut) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene(3);
-  const FrameLayout layout = frame_layout(scene, particles);
-  const FrameFile file = FrameFile::create(folder / "f.h5", scene, layout, {});
-  EXPECT_THROW(FrameFile::reopen(folder / "f.h5", layout), InputError);
+  const frames::Layout layout = frames::layout_of(scene, particles);
+  const frames::File file = frames::File::create(folder / "f.h5", scene, layout, {});
+  EXPECT_THROW(frames::File::reopen(folder / "f.h5", layout), InputError);
 }
 
 TEST(FrameFile, RefusesToContinueFramesOfAnotherShape) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene(3);
   {
-    FrameFile::create(folder / "f.h5", scene, frame_layout(scene, particles), {});
+    frames::File::create(folder / "f.h5", scene, frames::layout_of(scene, particles), {});
   }
   try {
-    FrameFile::reopen(folder / "f.h5", frame_layout(scene, particles + 1));
+    frames::File::reopen(folder / "f.h5", frames::layout_of(scene, particles + 1));
     FAIL() << "must be refused";
   } catch (const InputError& error) {
     EXPECT_EQ(error.key(), "/fluid/position");
@@ -152,31 +152,31 @@ TEST(FrameFile, RefusesToContinueFramesOfAnotherShape) {
 TEST(FrameFile, IsTheSameFileForTheSameFrames) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene(3);
-  const FrameLayout layout = frame_layout(scene, particles);
-  const Frame frame = awkward_frame(scene, layout, 0);
+  const frames::Layout layout = frames::layout_of(scene, particles);
+  const frames::Frame frame = awkward_frame(scene, layout, 0);
   for (const char* name : {"a.h5", "b.h5"})
-    FrameFile::create(folder / name, scene, layout, {{"backend", "hash"}}).write(frame);
+    frames::File::create(folder / name, scene, layout, {{"backend", "hash"}}).write(frame);
   EXPECT_TRUE(text_of(folder / "a.h5") == text_of(folder / "b.h5"));
 }
 
 TEST(FrameFile, TakesAsManyBytesAsForetold) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene(40);
-  const FrameLayout layout = frame_layout(scene, particles);
+  const frames::Layout layout = frames::layout_of(scene, particles);
   {
-    FrameFile::create(folder / "f.h5", scene, layout, {});
+    frames::File::create(folder / "f.h5", scene, layout, {});
   }
   const auto size = static_cast<std::int64_t>(std::filesystem::file_size(folder / "f.h5"));
-  EXPECT_GE(size, frame_file_bytes(layout));
-  EXPECT_LE(size, frame_file_bytes(layout) + 20'000);  // HDF5's own structures and the scene
+  EXPECT_GE(size, frames::file_bytes(layout));
+  EXPECT_LE(size, frames::file_bytes(layout) + 20'000);  // HDF5's own structures and the scene
 }
 
 TEST(CsvWriter, WritesNumbersThatReadBackAsTheSameFloats) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene(3);
-  const FrameLayout layout = frame_layout(scene, particles);
-  const Frame frame = awkward_frame(scene, layout, 2);
-  CsvWriter(folder / "csv", scene, layout).write(frame);
+  const frames::Layout layout = frames::layout_of(scene, particles);
+  const frames::Frame frame = awkward_frame(scene, layout, 2);
+  frames::CsvWriter(folder / "csv", scene, layout).write(frame);
 
   const auto rows = csv_rows(folder / "csv/fluid_000002.csv");
   ASSERT_EQ(rows.size(), 1u + particles);
@@ -199,12 +199,12 @@ TEST(CsvWriter, WritesManyParticlesInTheirOrder) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene(3);
   const std::size_t n = 10'001;
-  Frame frame = awkward_frame(scene, frame_layout(scene, particles), 1);
+  frames::Frame frame = awkward_frame(scene, frames::layout_of(scene, particles), 1);
   frame.density.resize(n);
   for (std::size_t i = 0; i < n; ++i) frame.density[i] = static_cast<float>(i);
   for (auto* values : {&frame.position, &frame.velocity}) values->resize(3 * n);
   frame.pressure.resize(n);
-  CsvWriter(folder / "csv", scene, frame_layout(scene, n)).write(frame);
+  frames::CsvWriter(folder / "csv", scene, frames::layout_of(scene, n)).write(frame);
   const auto rows = csv_rows(folder / "csv/fluid_000001.csv");
   ASSERT_EQ(rows.size(), 1 + n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -216,8 +216,8 @@ TEST(CsvWriter, WritesManyParticlesInTheirOrder) {
 TEST(CsvWriter, KeepsMovingAndFixedWallsApartAndCountsTheirIdsThrough) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene(3);
-  const FrameLayout layout = frame_layout(scene, particles);
-  CsvWriter(folder / "csv", scene, layout).write(awkward_frame(scene, layout, 1));
+  const frames::Layout layout = frames::layout_of(scene, particles);
+  frames::CsvWriter(folder / "csv", scene, layout).write(awkward_frame(scene, layout, 1));
   const auto moving = csv_rows(folder / "csv/boundary_000001.csv");
   const auto fixed = csv_rows(folder / "csv/boundary_static.csv");
   const auto source = static_cast<std::size_t>(layout.walls.at(0).surface.vertex.cols());
@@ -247,14 +247,14 @@ std::vector<std::pair<std::string, std::vector<std::int64_t>>> references(const 
 TEST(Xdmf, RefersToDatasetsThatExistWithTheirShapes) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene(3);
-  const FrameLayout layout = frame_layout(scene, particles);
+  const frames::Layout layout = frames::layout_of(scene, particles);
   {
-    FrameFile::create(folder / "frames.h5", scene, layout, {});
+    frames::File::create(folder / "frames.h5", scene, layout, {});
   }
   const Hdf5Reader file(folder / "frames.h5");
   const std::vector<double> times = {0, 0.1, 0.2, 0.3};
-  const auto fluid = references(frames_xdmf(layout, times, "frames.h5"));
-  const auto walls = references(walls_xdmf(layout, times, "frames.h5"));
+  const auto fluid = references(frames::fluid_xdmf(layout, times, "frames.h5"));
+  const auto walls = references(frames::walls_xdmf(layout, times, "frames.h5"));
   EXPECT_EQ(fluid.size(), 4u * 5);      // frames × (position and four attributes)
   EXPECT_EQ(walls.size(), 4u * 2 * 2);  // frames × containers × (triangles and vertices)
   for (const auto& list : {fluid, walls})
@@ -263,7 +263,8 @@ TEST(Xdmf, RefersToDatasetsThatExistWithTheirShapes) {
 
 TEST(Xdmf, SelectsEachFrameOnceAndGivesItsTime) {
   const Scene scene = test::falling_points_scene(3);
-  const std::string xdmf = frames_xdmf(frame_layout(scene, particles), {0, 0.125, 0.25, 0.375}, "frames.h5");
+  const std::string xdmf =
+      frames::fluid_xdmf(frames::layout_of(scene, particles), {0, 0.125, 0.25, 0.375}, "frames.h5");
   for (const char* part : {"<Time Value=\"0.125\"/>", "<Time Value=\"0.375\"/>", ">0 0 0 1 1 1 1 7 3<",
                            ">3 0 0 1 1 1 1 7 3<", ">3 0 1 1 1 7<"})
     EXPECT_NE(xdmf.find(part), std::string::npos) << part;
@@ -273,7 +274,8 @@ TEST(Xdmf, SelectsEachFrameOnceAndGivesItsTime) {
 TEST(Xdmf, StartsEveryHyperSlabWithItsFrame) {
   // ParaView keeps a geometry for as long as the first node inside its DataItem stays the same.
   const Scene scene = test::falling_points_scene(3);
-  const std::string xdmf = walls_xdmf(frame_layout(scene, particles), {0, 0.125, 0.25, 0.375}, "frames.h5");
+  const std::string xdmf =
+      frames::walls_xdmf(frames::layout_of(scene, particles), {0, 0.125, 0.25, 0.375}, "frames.h5");
   std::size_t slabs = 0;
   const std::regex slab("ItemType=\"HyperSlab\" Dimensions=\"[0-9 ]+\"><!-- frame ([0-9]) -->");
   for (std::sregex_iterator it(xdmf.begin(), xdmf.end(), slab), end; it != end; ++it)

@@ -31,8 +31,8 @@ using test::FallingPoints;
 using test::pour_command;
 using test::TemporaryFolder;
 
-PourOptions quiet_options(const fs::path& out) {
-  PourOptions options;
+pour::Options quiet_options(const fs::path& out) {
+  pour::Options options;
   options.out = out;
   options.quiet = true;
   return options;
@@ -63,12 +63,12 @@ void expect_same_timeline(const fs::path& a, const fs::path& b) {
 }
 
 /// Pours in a child that is gone, without a word, when `backend` reaches the substep.
-void pour_until_killed(const Scene& scene, Backend& backend, const PourOptions& options) {
+void pour_until_killed(const Scene& scene, Backend& backend, const pour::Options& options) {
   const pid_t child = ::fork();
   ASSERT_GE(child, 0);
   if (child == 0) {
     try {
-      pour(scene, backend, options);
+      pour::run(scene, backend, options);
     } catch (...) {
     }
     ::_exit(0);
@@ -82,7 +82,7 @@ TEST(Pour, LeavesWholeFilesAndNoTraceOfTheWork) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene();
   FallingPoints backend;
-  const PourResult result = pour(scene, backend, quiet_options(folder / "out"));
+  const pour::Result result = pour::run(scene, backend, quiet_options(folder / "out"));
   EXPECT_TRUE(result.finished);
   EXPECT_EQ(result.summary.substeps, 60);
   std::vector<std::string> names;
@@ -96,7 +96,7 @@ TEST(Pour, AccountsForAllMassAtEveryFrame) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene();
   FallingPoints backend;
-  const PourResult result = pour(scene, backend, quiet_options(folder / "out"));
+  const pour::Result result = pour::run(scene, backend, quiet_options(folder / "out"));
   EXPECT_TRUE(result.summary.balanced());
   double mass = 0;
   for (const double m : result.summary.mass_at) mass += m;
@@ -129,8 +129,8 @@ TEST(Pour, FollowsPathsOverARimHoweverFewFramesThereAre) {
     Scene scene = test::falling_points_scene(frames);
     scene.schedule.substeps_per_frame = 300 / frames;
     Leaping over(0.3), through(0);
-    EXPECT_FALSE(pour(scene, over, quiet_options(folder / "over")).summary.penetrated()) << frames;
-    EXPECT_TRUE(pour(scene, through, quiet_options(folder / "through")).summary.penetrated()) << frames;
+    EXPECT_FALSE(pour::run(scene, over, quiet_options(folder / "over")).summary.penetrated()) << frames;
+    EXPECT_TRUE(pour::run(scene, through, quiet_options(folder / "through")).summary.penetrated()) << frames;
   }
 }
 
@@ -138,18 +138,18 @@ TEST(Pour, StoppedAndResumedEndsInTheSameBits) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene();
   FallingPoints whole, first, second;
-  pour(scene, whole, quiet_options(folder / "whole"));
+  pour::run(scene, whole, quiet_options(folder / "whole"));
 
-  PourOptions options = quiet_options(folder / "parts");
+  pour::Options options = quiet_options(folder / "parts");
   int frames = 0;
   options.stop = [&] { return frames++ == 5; };
-  const PourResult stopped = pour(scene, first, options);
+  const pour::Result stopped = pour::run(scene, first, options);
   EXPECT_FALSE(stopped.finished);
   EXPECT_EQ(stopped.frame, 5);
   EXPECT_FALSE(fs::exists(folder / "parts/frames.h5"));
   options.resume = true;
   options.stop = {};
-  const PourResult resumed = pour(scene, second, options);
+  const pour::Result resumed = pour::run(scene, second, options);
   EXPECT_TRUE(resumed.finished);
   EXPECT_TRUE(same_bytes(folder / "whole/frames.h5", folder / "parts/frames.h5"));
   for (const char* file : {"frames.xdmf", "walls.xdmf", "frames.vtkhdf", "walls.vtkhdf"})
@@ -164,7 +164,7 @@ TEST(Pour, KilledAnywhereLeavesReadableFramesAndResumesToTheSameBits) {
   // Beside the threads of "host" no frame is written.
   FallingPoints whole;
   whole.info_.executor = "cuda";
-  pour(scene, whole, quiet_options(folder / "whole"));
+  pour::run(scene, whole, quiet_options(folder / "whole"));
   for (const std::int64_t deadly : {0, 15, 40, 55}) {
     const fs::path out = folder / ("out" + std::to_string(deadly));
     FallingPoints dying, second;
@@ -172,7 +172,7 @@ TEST(Pour, KilledAnywhereLeavesReadableFramesAndResumesToTheSameBits) {
     dying.before_advance = [&](std::int64_t substep) {
       if (substep == deadly) ::raise(SIGKILL);
     };
-    PourOptions options = quiet_options(out);
+    pour::Options options = quiet_options(out);
     options.checkpoint_seconds = deadly == 40 ? 0.0 : 30.0;
     pour_until_killed(scene, dying, options);
 
@@ -181,10 +181,10 @@ TEST(Pour, KilledAnywhereLeavesReadableFramesAndResumesToTheSameBits) {
     const Eigen::VectorXd times = Hdf5Reader(out / "frames.h5.partial").vector("/time", 13);
     for (std::int64_t frame = 0; frame < std::max<std::int64_t>(deadly / 5, 1); ++frame)
       EXPECT_EQ(times[frame], scene.time_at(5 * frame)) << "killed at substep " << deadly;
-    const Checkpoint checkpoint = read_checkpoint(out / "checkpoint.h5");
+    const pour::Checkpoint checkpoint = pour::read_checkpoint(out / "checkpoint.h5");
     EXPECT_EQ(checkpoint.frame, deadly == 40 ? 8 : 0);
     options.resume = true;
-    EXPECT_TRUE(pour(scene, second, options).finished);
+    EXPECT_TRUE(pour::run(scene, second, options).finished);
     EXPECT_TRUE(same_bytes(out / "frames.h5", folder / "whole/frames.h5"));
   }
 }
@@ -193,29 +193,29 @@ TEST(Pour, KilledWhileNamingItsFilesResumesAllTheSame) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene();
   FallingPoints whole, second;
-  PourOptions options = quiet_options(folder / "out");
+  pour::Options options = quiet_options(folder / "out");
   int frames = 0;
   options.stop = [&] { return frames++ == 5; };
-  pour(scene, whole, options);
+  pour::run(scene, whole, options);
   fs::rename(folder / "out/frames.h5.partial", folder / "out/frames.h5");
   options.resume = true;
   options.stop = {};
-  EXPECT_TRUE(pour(scene, second, options).finished);
+  EXPECT_TRUE(pour::run(scene, second, options).finished);
 }
 
 TEST(Pour, WithTheReferenceResumesToTheSameBits) {
   const TemporaryFolder folder;
   Scene scene = test::falling_points_scene(4);
   scene.schedule.end = 0.008;  // 20 substeps of 0.4 ms, as the speed of sound asks for
-  PourOptions options = quiet_options(folder / "whole");
-  pour(scene, *make_reference_backend(), options);
+  pour::Options options = quiet_options(folder / "whole");
+  pour::run(scene, *make_reference_backend(), options);
   options.out = folder / "parts";
   int frames = 0;
   options.stop = [&] { return frames++ == 2; };
-  pour(scene, *make_reference_backend(), options);
+  pour::run(scene, *make_reference_backend(), options);
   options.resume = true;
   options.stop = {};
-  EXPECT_TRUE(pour(scene, *make_reference_backend(), options).finished);
+  EXPECT_TRUE(pour::run(scene, *make_reference_backend(), options).finished);
   EXPECT_TRUE(same_bytes(folder / "whole/frames.h5", folder / "parts/frames.h5"));
   expect_same_timeline(folder / "whole/timeline.h5", folder / "parts/timeline.h5");
 }
@@ -236,48 +236,48 @@ TEST(Pour, NamesWhatDiffersFromThePourToResume) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene();
   FallingPoints backend;
-  PourOptions options = quiet_options(folder / "out");
+  pour::Options options = quiet_options(folder / "out");
   options.stop = [] { return true; };
-  pour(scene, backend, options);
+  pour::run(scene, backend, options);
   options.resume = true;
 
   Scene thicker = scene;
   thicker.fluid.viscosity = 0.06;
-  const InputError scene_differs = refusal([&] { pour(thicker, backend, options); });
+  const InputError scene_differs = refusal([&] { pour::run(thicker, backend, options); });
   EXPECT_NE(scene_differs.key().find("viscosity"), std::string::npos) << scene_differs.what();
   EXPECT_EQ(scene_differs.value(), "0.06");
 
-  const InputError frames_differ = refusal([&] { pour(with_frames(scene, 6), backend, options); });
+  const InputError frames_differ = refusal([&] { pour::run(pour::with_frames(scene, 6), backend, options); });
   EXPECT_EQ(frames_differ.key(), "time.frames");
 
   FallingPoints other;
   other.info_.name = "hash";
-  EXPECT_EQ(refusal([&] { pour(scene, other, options); }).key(), "--backend");
+  EXPECT_EQ(refusal([&] { pour::run(scene, other, options); }).key(), "--backend");
   other = backend;
   other.info_.executor = "cuda";
-  EXPECT_EQ(refusal([&] { pour(scene, other, options); }).key(), "--executor");
+  EXPECT_EQ(refusal([&] { pour::run(scene, other, options); }).key(), "--executor");
   options.csv = true;
-  EXPECT_EQ(refusal([&] { pour(scene, backend, options); }).key(), "--csv");
+  EXPECT_EQ(refusal([&] { pour::run(scene, backend, options); }).key(), "--csv");
 }
 
 TEST(Pour, DoesNotOverwriteAndDoesNotResumeWhatIsComplete) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene(2);
   FallingPoints backend;
-  PourOptions options = quiet_options(folder / "out");
-  pour(scene, backend, options);
-  EXPECT_EQ(refusal([&] { pour(scene, backend, options); }).key(), "--out");
+  pour::Options options = quiet_options(folder / "out");
+  pour::run(scene, backend, options);
+  EXPECT_EQ(refusal([&] { pour::run(scene, backend, options); }).key(), "--out");
   options.resume = true;
-  EXPECT_EQ(refusal([&] { pour(scene, backend, options); }).key(), "--resume");
+  EXPECT_EQ(refusal([&] { pour::run(scene, backend, options); }).key(), "--resume");
   options.out = folder / "nothing-here";
-  EXPECT_EQ(refusal([&] { pour(scene, backend, options); }).key(), "--resume");
+  EXPECT_EQ(refusal([&] { pour::run(scene, backend, options); }).key(), "--resume");
 }
 
 TEST(Pour, IsRefusedBeforeAnyWorkWhereTheDiskIsTooSmall) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene(1'000'000'000);
   FallingPoints backend;
-  const InputError error = refusal([&] { pour(scene, backend, quiet_options(folder / "out")); });
+  const InputError error = refusal([&] { pour::run(scene, backend, quiet_options(folder / "out")); });
   EXPECT_EQ(error.key(), "--out");
   EXPECT_NE(error.bound().find("needs"), std::string::npos);
   EXPECT_NE(error.bound().find("free"), std::string::npos);
@@ -288,13 +288,13 @@ TEST(Pour, SaysBeforeTheFirstFrameHowMuchItWrites) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene();
   FallingPoints backend;
-  PourOptions options = quiet_options(folder / "out");
+  pour::Options options = quiet_options(folder / "out");
   options.quiet = false;
   testing::internal::CaptureStderr();
-  const PourResult result = pour(scene, backend, options);
+  const pour::Result result = pour::run(scene, backend, options);
   const std::string said = testing::internal::GetCapturedStderr();
   const std::string per_frame =
-      fmt::format("{:.1f} kB", 1e-3 * double(frame_file_bytes(frame_layout(scene, 180))) / 13);
+      fmt::format("{:.1f} kB", 1e-3 * double(frames::file_bytes(frames::layout_of(scene, 180))) / 13);
   EXPECT_EQ(said.find("disk: 13 frames of " + per_frame + ", needs "), 0u) << said;
   EXPECT_LT(said.find(" free\n"), said.find("frame 0/12")) << said;
   EXPECT_GE(result.fields_seconds, 0);
@@ -307,7 +307,7 @@ TEST(Pour, SavesTheLastGoodStateWhereTheBackendReportsTrouble) {
   FallingPoints backend;
   backend.trouble_at = 17;
   try {
-    pour(scene, backend, quiet_options(folder / "out"));
+    pour::run(scene, backend, quiet_options(folder / "out"));
     FAIL() << "must fail";
   } catch (const BackendError& error) {
     const std::string what = error.what();
@@ -344,7 +344,7 @@ TEST(Pour, SavesTheLastGoodStateWhereAValueIsNotFinite) {
     const Scene scene = test::falling_points_scene();
     Poisoned backend(20, density);
     try {
-      pour(scene, backend, quiet_options(folder / "out"));
+      pour::run(scene, backend, quiet_options(folder / "out"));
       FAIL() << "must fail";
     } catch (const BackendError& error) {
       const std::string what = error.what();
@@ -360,9 +360,9 @@ TEST(Pour, WritesCsvFramesBesideTheOthers) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene(3);
   FallingPoints backend;
-  PourOptions options = quiet_options(folder / "out");
+  pour::Options options = quiet_options(folder / "out");
   options.csv = true;
-  pour(scene, backend, options);
+  pour::run(scene, backend, options);
   for (const char* name : {"fluid_000000.csv", "fluid_000003.csv", "boundary_000003.csv", "boundary_static.csv"})
     EXPECT_TRUE(fs::exists(folder / "out/csv" / name)) << name;
 }
@@ -387,23 +387,23 @@ TEST(PourCommand, RefusesOptionsOutOfRangeNamingThemAndTheirBounds) {
 }
 
 TEST(Summary, SeesMassThatDoesNotAddUpAndTheFirstPenetration) {
-  Timeline timeline;
+  pour::Timeline timeline;
   timeline.rows.resize(4);
   for (std::int64_t f = 0; f < 4; ++f) {
-    TimelineRow& row = timeline.rows[static_cast<std::size_t>(f)];
+    pour::TimelineRow& row = timeline.rows[static_cast<std::size_t>(f)];
     row.frame = f;
     row.particles_at = {10, 0, 0, 0, 0};
     row.mass_at = {10 * 0.25, 0, 0, 0, 0};
     row.kinetic_energy = f == 1 ? 3.0 : 1.0;
   }
-  EXPECT_TRUE(summarise(timeline, 10, 0.25).balanced());
-  EXPECT_FALSE(summarise(timeline, 10, 0.25).penetrated());
+  EXPECT_TRUE(pour::summarise(timeline, 10, 0.25).balanced());
+  EXPECT_FALSE(pour::summarise(timeline, 10, 0.25).penetrated());
   timeline.rows[3].particles_at[0] = 9;
   timeline.rows[2].mass_at[0] = 10 * 0.25 * (1 + 1e-12);
   timeline.rows[2].crossed = 1;
   timeline.rows[2].first_crossed = 7;
   timeline.rows[3].inside = 2;
-  const PourSummary summary = summarise(timeline, 10, 0.25);
+  const pour::Summary summary = pour::summarise(timeline, 10, 0.25);
   EXPECT_EQ(summary.unbalanced_frames, 2);
   EXPECT_EQ(summary.penetration_frame, 2);
   EXPECT_EQ(summary.penetration_particle, 7);
@@ -414,7 +414,7 @@ TEST(WithFrames, KeepsTheTimeAndNeverLengthensASubstepThatTheSceneSets) {
   Scene scene = test::falling_points_scene(12);  // 60 substeps
   scene.schedule.substeps_derived = false;
   for (const int frames : {1, 5, 7, 12, 59, 60, 61, 1000}) {
-    const Scene other = with_frames(scene, frames);
+    const Scene other = pour::with_frames(scene, frames);
     EXPECT_EQ(other.schedule.frames, frames);
     EXPECT_EQ(other.schedule.end, scene.schedule.end);
     EXPECT_LE(other.time_step(), scene.time_step() * (1 + 1e-15));

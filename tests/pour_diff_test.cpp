@@ -38,11 +38,11 @@ class PourDifference : public testing::Test {
  protected:
   fs::path poured(const std::string& name, FallingPoints& backend, std::uint32_t seed = 0,
                   const Scene& scene = test::falling_points_scene()) {
-    PourOptions options;
+    pour::Options options;
     options.out = folder_ / name;
     options.quiet = true;
     options.perturbation = seed;
-    pour(scene, backend, options);
+    pour::run(scene, backend, options);
     return options.out;
   }
   fs::path poured(const std::string& name, std::uint32_t seed = 0) {
@@ -53,12 +53,12 @@ class PourDifference : public testing::Test {
 };
 
 TEST_F(PourDifference, OfTwoPoursOfTheSameBitsIsNone) {
-  const PourDiff diff = pour_difference(poured("a"), poured("b"), {});
+  const pour::Difference diff = pour::difference(poured("a"), poured("b"), {});
   EXPECT_EQ(diff.frames.size(), 13u);
   EXPECT_EQ(diff.frames_missing, 0);
   EXPECT_EQ(diff.first_difference(), -1);
   EXPECT_TRUE(diff.within());
-  EXPECT_TRUE(pour_diff_line(diff).ends_with(": the same bits")) << pour_diff_line(diff);
+  EXPECT_TRUE(pour::difference_line(diff).ends_with(": the same bits")) << pour::difference_line(diff);
 }
 
 TEST_F(PourDifference, IsFirstSeenWhereItArises) {
@@ -66,10 +66,10 @@ TEST_F(PourDifference, IsFirstSeenWhereItArises) {
   const double kick = 0.5;
   Kicked backend(20, kick);
   const Scene scene = test::falling_points_scene();
-  const PourDiff diff = pour_difference(poured("a"), poured("b", backend), {});
+  const pour::Difference diff = pour::difference(poured("a"), poured("b", backend), {});
   EXPECT_EQ(diff.first_difference(), 5);
   EXPECT_EQ(diff.first_fields(), (std::vector<std::string>{"position", "velocity", "kinetic_energy"}));
-  const FrameDifference& f = diff.frames[5];
+  const pour::FrameDifference& f = diff.frames[5];
   const double way = kick * 5 * scene.time_step() / scene.particle_spacing;
   EXPECT_NEAR(f.distance[0], way, 1e-4 * way);
   EXPECT_NEAR(f.farthest, way, 1e-4 * way);
@@ -81,22 +81,22 @@ TEST_F(PourDifference, IsFirstSeenWhereItArises) {
 
 TEST_F(PourDifference, IsWithinTheSpreadOfPoursThatDifferByTheirStartAlone) {
   const fs::path a = poured("a"), b = poured("b", 5), c = poured("c", 6), d = poured("d", 7);
-  const PourDiff alike = pour_difference(a, b, {c, d});
+  const pour::Difference alike = pour::difference(a, b, {c, d});
   EXPECT_EQ(alike.spread_pours, 3);
   EXPECT_EQ(alike.first_difference(), 0);
-  EXPECT_TRUE(alike.within()) << pour_diff_text(alike);
-  EXPECT_NE(pour_diff_line(alike).find("within the spread of 3 pours"), std::string::npos);
+  EXPECT_TRUE(alike.within()) << pour::difference_text(alike);
+  EXPECT_NE(pour::difference_line(alike).find("within the spread of 3 pours"), std::string::npos);
   Kicked backend(20, 0.05);
-  const PourDiff kicked = pour_difference(a, poured("kicked", backend), {c, d});
+  const pour::Difference kicked = pour::difference(a, poured("kicked", backend), {c, d});
   EXPECT_FALSE(kicked.within());
   EXPECT_EQ(kicked.beyond().frame, 5);
-  EXPECT_STREQ(pour_fields[kicked.beyond().field], "position");
+  EXPECT_STREQ(pour::compared_fields[kicked.beyond().field], "position");
   EXPECT_GT(kicked.beyond().times, 3);
   EXPECT_TRUE(std::isfinite(kicked.beyond().times));
 }
 
 TEST(PourDiff, CountsTheLargestSpreadUntilThenAndNoNumberAsBeyondIt) {
-  PourDiff diff;
+  pour::Difference diff;
   diff.spread_pours = 2;
   diff.factor = 3;
   diff.frames.resize(3);
@@ -126,7 +126,7 @@ TEST_F(PourDifference, RefusesAnotherSceneAndAnotherNumberOfParticlesByName) {
   FallingPoints one, two;
   const fs::path a = poured("a"), viscous = poured("viscous", one, 0, other);
   try {
-    pour_difference(a, viscous, {});
+    pour::difference(a, viscous, {});
     ADD_FAILURE() << "was not refused";
   } catch (const InputError& error) {
     EXPECT_EQ(error.file(), (viscous / "frames.h5").string());
@@ -137,35 +137,35 @@ TEST_F(PourDifference, RefusesAnotherSceneAndAnotherNumberOfParticlesByName) {
   other.fills[0].box->max.z() += 0.01;
   const fs::path more = poured("more", two, 0, other);
   try {
-    pour_difference(a, more, {});
+    pour::difference(a, more, {});
     ADD_FAILURE() << "was not refused";
   } catch (const InputError& error) {
     EXPECT_EQ(error.value(), "216 particles");
     EXPECT_NE(error.bound().find("180 particles"), std::string::npos) << error.bound();
   }
-  EXPECT_THROW(pour_difference(a, a, {more}), InputError);
-  EXPECT_THROW(pour_difference(a, folder_ / "nowhere", {}), InputError);
+  EXPECT_THROW(pour::difference(a, a, {more}), InputError);
+  EXPECT_THROW(pour::difference(a, folder_ / "nowhere", {}), InputError);
 }
 
 TEST_F(PourDifference, ComparesTheFramesThatAnInterruptedPourHas) {
-  PourOptions options;
+  pour::Options options;
   options.out = folder_ / "stopped";
   options.quiet = true;
   int frames = 0;
   options.stop = [&] { return ++frames == 4; };
   FallingPoints backend;
-  EXPECT_FALSE(pour(test::falling_points_scene(), backend, options).finished);
-  const PourDiff diff = pour_difference(poured("a"), options.out, {});
+  EXPECT_FALSE(pour::run(test::falling_points_scene(), backend, options).finished);
+  const pour::Difference diff = pour::difference(poured("a"), options.out, {});
   EXPECT_GE(diff.frames.size(), 4u);
   EXPECT_EQ(static_cast<std::int64_t>(diff.frames.size()) + diff.frames_missing, 13);
   EXPECT_TRUE(diff.within());
 }
 
 TEST_F(PourDifference, IsToldWithinAHundredColumnsAndInFullAsJson) {
-  const PourDiff diff = pour_difference(poured("a"), poured("b", 3), {poured("c", 4)});
-  std::istringstream lines(pour_diff_text(diff));
+  const pour::Difference diff = pour::difference(poured("a"), poured("b", 3), {poured("c", 4)});
+  std::istringstream lines(pour::difference_text(diff));
   for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 100u) << line;
-  const auto json = nlohmann::json::parse(pour_diff_json(diff, 1));
+  const auto json = nlohmann::json::parse(pour::difference_json(diff, 1));
   EXPECT_EQ(json["exit_status"], 1);
   EXPECT_EQ(json["by_frame"].size(), 13u);
   EXPECT_EQ(json["by_frame"][0]["distance"]["position"].get<double>(), diff.frames[0].distance[0]);
@@ -175,10 +175,10 @@ TEST_F(PourDifference, IsToldWithinAHundredColumnsAndInFullAsJson) {
 
 TEST_F(PourDifference, KnowsAPourByItsFolderAndByItsFrames) {
   const fs::path a = poured("a");
-  EXPECT_TRUE(is_pour(a));
-  EXPECT_TRUE(is_pour(a / "frames.h5"));
-  EXPECT_FALSE(is_pour(a / "timeline.h5"));
-  EXPECT_FALSE(is_pour(a / "nowhere.h5"));
+  EXPECT_TRUE(pour::is_pour(a));
+  EXPECT_TRUE(pour::is_pour(a / "frames.h5"));
+  EXPECT_FALSE(pour::is_pour(a / "timeline.h5"));
+  EXPECT_FALSE(pour::is_pour(a / "nowhere.h5"));
 }
 
 }  // namespace

@@ -40,7 +40,7 @@ TEST(Limits, AreTheSpeedThatTheStepIsDerivedForAQuarterOfSoundAndItsCompression)
 }
 
 TEST(Limits, NameTheFirstFrameAndParticleBeyondAndTheLargestOfAll) {
-  std::vector<TimelineRow> rows(5);
+  std::vector<pour::TimelineRow> rows(5);
   for (std::size_t f = 0; f < rows.size(); ++f) {
     rows[f].frame = static_cast<std::int64_t>(f);
     rows[f].max_speed = 1;
@@ -49,10 +49,10 @@ TEST(Limits, NameTheFirstFrameAndParticleBeyondAndTheLargestOfAll) {
     rows[f].densest_particle = static_cast<std::int64_t>(20 + f);
   }
   const SceneLimits limits{2, 5, 1100};
-  EXPECT_TRUE(limits_exceeded(rows, limits).empty());
+  EXPECT_TRUE(pour::limits_exceeded(rows, limits).empty());
   rows[2].max_speed = 3;
   rows[3].max_speed = 4;
-  auto found = limits_exceeded(rows, limits);
+  auto found = pour::limits_exceeded(rows, limits);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].limit, "time_step_speed");
   EXPECT_EQ(found[0].frame, 2);
@@ -62,7 +62,7 @@ TEST(Limits, NameTheFirstFrameAndParticleBeyondAndTheLargestOfAll) {
   EXPECT_EQ(found[0].frames, 2);
   rows[4].max_speed = std::numeric_limits<double>::quiet_NaN();
   rows[1].max_density = 1101;
-  found = limits_exceeded(rows, limits);
+  found = pour::limits_exceeded(rows, limits);
   ASSERT_EQ(found.size(), 3u);
   EXPECT_EQ(found[1].limit, "sound_speed_quarter");
   EXPECT_EQ(found[1].frame, 4);
@@ -96,24 +96,24 @@ Scene tearing_scene() {
 TEST(Limits, ThatAPourPassesAreInItsSummaryAndInItsJson) {
   const TemporaryFolder folder;
   const Scene scene = tearing_scene();
-  PourOptions options;
+  pour::Options options;
   options.out = folder / "out";
   options.quiet = true;
   const auto backend = make_backend("hash", Executor::host);
   testing::internal::CaptureStderr();
   options.quiet = false;
-  const PourResult result = pour(scene, *backend, options);
+  const pour::Result result = pour::run(scene, *backend, options);
   const std::string told = testing::internal::GetCapturedStderr();
   ASSERT_EQ(result.limits_exceeded.size(), 3u);
   EXPECT_GT(result.limits_exceeded[1].largest, scene.fluid.sound_speed / 4);
   EXPECT_GT(result.limits_exceeded[2].largest, 1000 * (1 + 1 / 16.0));
-  for (const LimitExceeded& e : result.limits_exceeded) {
+  for (const pour::LimitExceeded& e : result.limits_exceeded) {
     EXPECT_NE(told.find("warning: " + describe(e)), std::string::npos) << told;
-    const TimelineRow& row = result.timeline.rows.at(static_cast<std::size_t>(e.frame));
+    const pour::TimelineRow& row = result.timeline.rows.at(static_cast<std::size_t>(e.frame));
     EXPECT_EQ(e.value, e.limit == "density" ? row.max_density : row.max_speed);
     EXPECT_GE(e.particle, 0);
   }
-  const auto json = nlohmann::json::parse(pour_json(result, backend->info(), "out"));
+  const auto json = nlohmann::json::parse(pour::result_json(result, backend->info(), "out"));
   EXPECT_EQ(json.at("within_limits"), false);
   EXPECT_EQ(json.at("limits_exceeded").size(), 3u);
   EXPECT_EQ(json.at("limits_exceeded")[1].at("limit").get<std::string>(), "sound_speed_quarter");
@@ -125,12 +125,12 @@ TEST(Limits, ThatHoldAreNotComplainedOf) {
   const TemporaryFolder folder;
   Scene scene = test::falling_points_scene();
   FallingPoints backend;
-  PourOptions options;
+  pour::Options options;
   options.out = folder / "out";
   options.quiet = true;
-  const PourResult result = pour(scene, backend, options);
+  const pour::Result result = pour::run(scene, backend, options);
   EXPECT_TRUE(result.limits_exceeded.empty());
-  EXPECT_EQ(nlohmann::json::parse(pour_json(result, backend.info(), "out")).at("within_limits"), true);
+  EXPECT_EQ(nlohmann::json::parse(pour::result_json(result, backend.info(), "out")).at("within_limits"), true);
 }
 
 TEST(ExpectedSpeed, IsThatOfTheFastestWallWhateverItHolds) {

@@ -121,7 +121,7 @@ TEST(TwoPours, IntoOneFolderLeaveTheFilesOfTheOneThatWasFirst) {
 TEST(TwoPours, OfWhichOneRunsLeaveItsFileAlone) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene();
-  PourOptions options;
+  pour::Options options;
   options.out = folder / "out";
   options.quiet = true;
   // Every frame ends with a checkpoint, which waits for the thread that writes: nobody but the second pour
@@ -136,15 +136,15 @@ TEST(TwoPours, OfWhichOneRunsLeaveItsFileAlone) {
     for (const bool resume : {false, true}) {
       const int status = Process([&] {
                            FallingPoints second;
-                           PourOptions its = options;
+                           pour::Options its = options;
                            its.resume = resume;
-                           return pour(scene, second, its).finished ? 0 : 1;
+                           return pour::run(scene, second, its).finished ? 0 : 1;
                          }).wait();
       refused += status == exit_bad_input;
     }
     EXPECT_TRUE(frames == bytes_of(options.out / "frames.h5.partial"));
   };
-  EXPECT_TRUE(pour(scene, running, options).finished);
+  EXPECT_TRUE(pour::run(scene, running, options).finished);
   EXPECT_EQ(refused, 2);
 }
 
@@ -152,16 +152,16 @@ TEST(FolderLock, IsLetGoByAProcessThatIsKilled) {
   const TemporaryFolder folder;
   fs::create_directory(folder / "out");
   const Process holder([&] {
-    const FolderLock lock("--out", folder / "out");
+    const pour::FolderLock lock("--out", folder / "out");
     write_text_file(folder / "held", "yes");
     std::this_thread::sleep_for(std::chrono::seconds(60));
     return 0;
   });
   wait_for(folder / "held");
-  EXPECT_THROW(FolderLock("--out", folder / "out"), InputError);
+  EXPECT_THROW(pour::FolderLock("--out", folder / "out"), InputError);
   holder.signal(SIGKILL);
   EXPECT_EQ(holder.wait(), -SIGKILL);
-  EXPECT_NO_THROW(FolderLock("--out", folder / "out"));
+  EXPECT_NO_THROW(pour::FolderLock("--out", folder / "out"));
   EXPECT_TRUE(fs::is_empty(folder / "out"));
 }
 
@@ -195,31 +195,31 @@ int stuck_pour(const Scene& scene, const fs::path& out, std::int64_t stuck_at) {
     while (std::chrono::steady_clock::now() - start < std::chrono::seconds(60)) {
     }
   };
-  PourOptions options;
+  pour::Options options;
   options.out = out;
   options.quiet = true;
   options.stop = [] { return StopSignal::caught() != 0; };
-  options.leave = [](const PourResult&) { std::_Exit(128 + StopSignal::caught()); };
-  return pour(scene, backend, options).finished ? 0 : 128 + StopSignal::caught();
+  options.leave = [](const pour::Result&) { std::_Exit(128 + StopSignal::caught()); };
+  return pour::run(scene, backend, options).finished ? 0 : 128 + StopSignal::caught();
 }
 
 TEST(StoppedPour, LeavesACallThatTakesLongAndLosesNothingBeforeIt) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene();
   FallingPoints whole, second;
-  PourOptions options;
+  pour::Options options;
   options.quiet = true;
   options.out = folder / "whole";
-  pour(scene, whole, options);
+  pour::run(scene, whole, options);
   for (const int number : {SIGTERM, SIGINT}) {
     options.out = folder / std::to_string(number);
     const Process stuck([&] { return stuck_pour(scene, options.out, 35); });
     wait_for(options.out.string() + ".stuck");
     stuck.signal(number);
     EXPECT_LT(seconds_of([&] { EXPECT_EQ(stuck.wait(), 128 + number); }), 1.0);
-    EXPECT_EQ(read_checkpoint(options.out / "checkpoint.h5").frame, 35 / 5);
+    EXPECT_EQ(pour::read_checkpoint(options.out / "checkpoint.h5").frame, 35 / 5);
     options.resume = true;
-    EXPECT_TRUE(pour(scene, second, options).finished);
+    EXPECT_TRUE(pour::run(scene, second, options).finished);
     options.resume = false;
     EXPECT_TRUE(bytes_of(options.out / "frames.h5") == bytes_of(folder / "whole/frames.h5"));
   }
@@ -262,10 +262,10 @@ TEST(StoppedPour, StopsInsideAFrameAndGoesOnThereToTheSameBits) {
       std::this_thread::sleep_for(std::chrono::milliseconds(500 << attempt));
       pouring.signal(SIGTERM);
       EXPECT_LT(seconds_of([&] { EXPECT_EQ(pouring.wait(), 128 + SIGTERM); }), 1.0) << backend;
-      const Checkpoint left = read_checkpoint(out + "/checkpoint.h5");
+      const pour::Checkpoint left = pour::read_checkpoint(out + "/checkpoint.h5");
       EXPECT_EQ(left.frame, 0);
       EXPECT_GE(left.state.substep, before) << backend;
-      EXPECT_EQ(left.state.substep % Segments::longest, 0);
+      EXPECT_EQ(left.state.substep % pour::Segments::longest, 0);
       ahead += left.state.substep > before;
       before = left.state.substep;
     }
@@ -279,21 +279,21 @@ TEST(StoppedPour, InsideAFrameIsResumedToTheSameBitsAndTheSameTimeline) {
   scene.schedule.substeps_per_frame = 260;  // three segments
   for (const char* name : {"hash", "list"}) {
     const auto backend = [&] { return make_backend(name, Executor::host); };
-    PourOptions options;
+    pour::Options options;
     options.quiet = true;
     options.out = folder / name / "whole";
-    ASSERT_TRUE(pour(scene, *backend(), options).finished);
+    ASSERT_TRUE(pour::run(scene, *backend(), options).finished);
     for (const int segments : {1, 2, 4, 8}) {
       options.out = folder / name / ("parts" + std::to_string(segments));
       options.resume = false;
       int asked = 0;
       options.stop = [&] { return asked++ == segments; };
-      const PourResult stopped = pour(scene, *backend(), options);
+      const pour::Result stopped = pour::run(scene, *backend(), options);
       EXPECT_FALSE(stopped.finished);
       EXPECT_EQ(stopped.substep, 260 * (segments / 3) + 260 * (segments % 3) / 3);
       options.stop = {};
       options.resume = true;
-      EXPECT_TRUE(pour(scene, *backend(), options).finished);
+      EXPECT_TRUE(pour::run(scene, *backend(), options).finished);
       EXPECT_TRUE(bytes_of(options.out / "frames.h5") == bytes_of(folder / name / "whole/frames.h5"))
           << name << ", " << segments;
       const Hdf5Reader one(options.out / "timeline.h5"), other(folder / name / "whole/timeline.h5");
@@ -309,18 +309,18 @@ TEST(ResumedPour, IsThatOfTheSamePerturbation) {
   const TemporaryFolder folder;
   const Scene scene = test::falling_points_scene();
   FallingPoints backend;
-  PourOptions options;
+  pour::Options options;
   options.quiet = true;
   options.out = folder / "out";
   options.perturbation = 7;
   options.stop = [] { return true; };
-  pour(scene, backend, options);
+  pour::run(scene, backend, options);
   options.stop = {};
   options.resume = true;
   for (const std::uint32_t other : {0u, 8u}) {
     options.perturbation = other;
     try {
-      pour(scene, backend, options);
+      pour::run(scene, backend, options);
       FAIL() << "must be refused";
     } catch (const InputError& error) {
       EXPECT_EQ(error.key(), "--perturb");
@@ -328,7 +328,7 @@ TEST(ResumedPour, IsThatOfTheSamePerturbation) {
     }
   }
   options.perturbation = 7;
-  EXPECT_TRUE(pour(scene, backend, options).finished);
+  EXPECT_TRUE(pour::run(scene, backend, options).finished);
 }
 
 TEST(Segments, CoverAFrameMeetWhereWallsAreLookedAtAndStayShort) {
@@ -338,13 +338,13 @@ TEST(Segments, CoverAFrameMeetWhereWallsAreLookedAtAndStayShort) {
     for (const double speed : {0.1, 3.0, 30.0, 3000.0}) {
       scene.schedule.substeps_per_frame = substeps;
       scene.schedule.max_speed = speed;
-      const Segments segments(scene);
+      const pour::Segments segments(scene);
       std::int64_t done = 0, samples = 0;
       while (done < substeps) {
         ASSERT_TRUE(segments.meet_at(done));
         const std::int64_t end = segments.end_of(done);
         ASSERT_GT(end, done);
-        ASSERT_LE(end - done, Segments::longest);
+        ASSERT_LE(end - done, pour::Segments::longest);
         ASSERT_EQ(segments.meet_at(end - 1), end - 1 == done) << end << " of " << substeps;
         done = end;
         samples += segments.samples_at(done);

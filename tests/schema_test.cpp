@@ -56,13 +56,13 @@ TEST_F(Schema, AReportIsAsDocumented) {
 }
 
 TEST_F(Schema, AValidationIsAsDocumented) {
-  ValidationResult result;
+  validate::Result result;
   result.name = "case";
   result.add({"right", "m", 1, 1.01, 0.01, 0.02});
   result.curves.push_back({"panel", "found", "x", "m", "y", "Pa", false, {0, 1}, {2, 3}});
-  write_validation(file_, {result});
+  validate::write(file_, {result});
   EXPECT_EQ(checked(file_), 0);
-  write_validation(file_, {});
+  validate::write(file_, {});
   EXPECT_EQ(checked(file_), 0);
 }
 

@@ -183,7 +183,7 @@ TEST_P(DeficitGrowth, HasThosePowersWithinTheFitsOwnConfidence) {
   scene.fluid.viscosity = 0;
   const auto expected = edge_powers(scene);
   for (std::size_t k = 0; k < 3; ++k) {
-    const PowerFit fit = fit_power(points[k]);
+    const drift::PowerFit fit = drift::fit_power(points[k]);
     EXPECT_TRUE(fit.admits(expected[k])) << k << ": " << fit.power << " ± " << fit.confidence;
     EXPECT_LT(fit.confidence, 0.5) << k;  // tells one power from the next
   }
@@ -231,9 +231,9 @@ TEST(ListTheory, FindsTheSkinThatKeepsATolerance) {
 }
 
 TEST(PowerFit, FindsThePowerAndHowSureItIs) {
-  EXPECT_NEAR(fit_power({{1, 3}, {2, 24}, {3, 81}, {4, 192}}).power, 3, 1e-12);
-  EXPECT_NEAR(fit_power({{1, 3}, {2, 24}, {3, 81}, {4, 192}}).confidence, 0, 1e-6);
-  EXPECT_TRUE(std::isnan(fit_power({{1, 1}, {2, 2}, {3, 0}, {4, 4}}).power));
+  EXPECT_NEAR(drift::fit_power({{1, 3}, {2, 24}, {3, 81}, {4, 192}}).power, 3, 1e-12);
+  EXPECT_NEAR(drift::fit_power({{1, 3}, {2, 24}, {3, 81}, {4, 192}}).confidence, 0, 1e-6);
+  EXPECT_TRUE(std::isnan(drift::fit_power({{1, 1}, {2, 2}, {3, 0}, {4, 4}}).power));
   // Student's quantile for 8 degrees of freedom is 2.306.
   std::vector<std::pair<double, double>> points;
   double xx = 0, rest = 0;
@@ -242,7 +242,7 @@ TEST(PowerFit, FindsThePowerAndHowSureItIs) {
     points.emplace_back(std::exp(x), std::exp(2 * x + e));
     xx += x * x;
   }
-  const PowerFit fit = fit_power(points);
+  const drift::PowerFit fit = drift::fit_power(points);
   for (int k = 0; k < 10; ++k) rest += std::pow((2 - fit.power) * (k - 4.5) + (k % 2 ? 0.1 : -0.1), 2);
   EXPECT_NEAR(fit.confidence, 2.306 * std::sqrt(rest / 8 / xx), 1e-3 * fit.confidence);
 }

@@ -25,8 +25,8 @@ namespace fs = std::filesystem;
 
 const fs::path fixtures = fs::path(DECANT_SOURCE_DIR) / "fixtures";
 
-const ValidationCase& case_named(std::string_view name) {
-  for (const auto& which : validation_cases())
+const validate::Case& case_named(std::string_view name) {
+  for (const auto& which : validate::cases())
     if (which.name == name) return which;
   throw std::out_of_range(std::string(name));
 }
@@ -36,7 +36,7 @@ struct Staged {
   explicit Staged(const std::string& name, int resolution = 0)
       : which(case_named(name)),
         layers(resolution ? resolution : which.resolutions.front()),
-        scene(scene_of(which, layers, fixtures / "scenes")),
+        scene(validate::scene_of(which, layers, fixtures / "scenes")),
         walls(sample_walls(scene)),
         state(initial_state(scene)),
         fields(Fields::unwritten(state.size(), walls.size())),
@@ -49,22 +49,22 @@ struct Staged {
     observer->sample({time, state, fields});
   }
 
-  ValidationResult finish() {
-    ValidationResult result;
+  validate::Result finish() {
+    validate::Result result;
     observer->finish(result);
     return result;
   }
 
-  const ValidationCase& which;
+  const validate::Case& which;
   int layers;
   Scene scene;
   Walls walls;
   ParticleState state;
   Fields fields;
-  std::unique_ptr<CaseObserver> observer;
+  std::unique_ptr<validate::Observer> observer;
 };
 
-const ValidationQuantity& quantity(const ValidationResult& result, std::string_view start) {
+const validate::Quantity& quantity(const validate::Result& result, std::string_view start) {
   for (const auto& q : result.quantities)
     if (q.name.starts_with(start)) return q;
   throw std::out_of_range(std::string(start));
@@ -74,13 +74,13 @@ TEST(ExactSolutions, CupResidualHasThePublishedVolumes) {
   const double expected[][2] = {{0, 346.36},  {15, 310.27}, {30, 268.59}, {45, 211.67},
                                 {60, 123.13}, {75, 43.86},  {85, 8.66}};
   for (const auto& [degrees, volume] : expected)
-    EXPECT_NEAR(1e6 * cup_residual(0.035, 0.09, degrees * std::numbers::pi / 180), volume, 0.006) << degrees;
+    EXPECT_NEAR(1e6 * validate::cup_residual(0.035, 0.09, degrees * std::numbers::pi / 180), volume, 0.006) << degrees;
 }
 
 TEST(ExactSolutions, DropHasMonaghansAxes) {
-  EXPECT_NEAR(drop_axis(100, 0.0008), 1.083103, 1e-6);
-  EXPECT_NEAR(drop_axis(100, 0.0038), 1.439219, 1e-6);
-  EXPECT_NEAR(drop_axis(100, 0.0076), 1.944517, 1e-6);
+  EXPECT_NEAR(validate::drop_axis(100, 0.0008), 1.083103, 1e-6);
+  EXPECT_NEAR(validate::drop_axis(100, 0.0038), 1.439219, 1e-6);
+  EXPECT_NEAR(validate::drop_axis(100, 0.0076), 1.944517, 1e-6);
 }
 
 // u_t = nu u_zz + F, u = 0 at the start and at plates at rest.
@@ -93,35 +93,35 @@ TEST(ExactSolutions, ChannelSeriesSolveTheirEquation) {
         const double curvature = (u(z + d, t) - 2 * u(z, t) + u(z - d, t)) / (d * d);
         return std::abs(rate - nu * curvature - force);
       };
-      EXPECT_LT(residual([&](double y, double s) { return couette_velocity(V, nu, L, y, s); }, 0), 1e-4);
-      EXPECT_LT(residual([&](double y, double s) { return poiseuille_velocity(F, nu, L, y, s); }, F), 1e-4);
+      EXPECT_LT(residual([&](double y, double s) { return validate::couette_velocity(V, nu, L, y, s); }, 0), 1e-4);
+      EXPECT_LT(residual([&](double y, double s) { return validate::poiseuille_velocity(F, nu, L, y, s); }, F), 1e-4);
     }
-  EXPECT_NEAR(couette_velocity(V, nu, L, L, 0.2), V, 1e-12);
-  EXPECT_NEAR(couette_velocity(V, nu, L, 0, 0.2), 0, 1e-12);
-  EXPECT_NEAR(couette_velocity(V, nu, L, 0.01, 0.01), 0, 1e-4 * V);
-  EXPECT_NEAR(poiseuille_velocity(F, nu, L, 0.01, 0), 0, 1e-5 * V);
-  EXPECT_NEAR(poiseuille_velocity(F, nu, L, 0.01, 100), F * L * L / (8 * nu), 1e-12);
+  EXPECT_NEAR(validate::couette_velocity(V, nu, L, L, 0.2), V, 1e-12);
+  EXPECT_NEAR(validate::couette_velocity(V, nu, L, 0, 0.2), 0, 1e-12);
+  EXPECT_NEAR(validate::couette_velocity(V, nu, L, 0.01, 0.01), 0, 1e-4 * V);
+  EXPECT_NEAR(validate::poiseuille_velocity(F, nu, L, 0.01, 0), 0, 1e-5 * V);
+  EXPECT_NEAR(validate::poiseuille_velocity(F, nu, L, 0.01, 100), F * L * L / (8 * nu), 1e-12);
 }
 
 TEST(Curves, AnswerBetweenTheirPoints) {
-  const Curve curve{{0, 1, 3}, {0, 2, -2}};
-  EXPECT_DOUBLE_EQ(value_at(curve, 0.5), 1);
-  EXPECT_DOUBLE_EQ(value_at(curve, 3), -2);
-  EXPECT_TRUE(std::isnan(value_at(curve, 3.1)));
-  EXPECT_DOUBLE_EQ(first_reach(curve, 1), 0.5);
-  EXPECT_TRUE(std::isnan(first_reach(curve, 2.1)));
-  EXPECT_EQ(first_reach_between(curve, 1), std::pair(0.0, 1.0));
-  EXPECT_DOUBLE_EQ(integral(curve, 0.5, 2), 0.75 + 1);
-  EXPECT_TRUE(std::isnan(integral(curve, -1, 2)));
-  EXPECT_DOUBLE_EQ(slope(curve, 0, 1), 2);
-  EXPECT_TRUE(std::isnan(slope(curve, 2, 4)));
+  const validate::Curve curve{{0, 1, 3}, {0, 2, -2}};
+  EXPECT_DOUBLE_EQ(validate::value_at(curve, 0.5), 1);
+  EXPECT_DOUBLE_EQ(validate::value_at(curve, 3), -2);
+  EXPECT_TRUE(std::isnan(validate::value_at(curve, 3.1)));
+  EXPECT_DOUBLE_EQ(validate::first_reach(curve, 1), 0.5);
+  EXPECT_TRUE(std::isnan(validate::first_reach(curve, 2.1)));
+  EXPECT_EQ(validate::first_reach_between(curve, 1), std::pair(0.0, 1.0));
+  EXPECT_DOUBLE_EQ(validate::integral(curve, 0.5, 2), 0.75 + 1);
+  EXPECT_TRUE(std::isnan(validate::integral(curve, -1, 2)));
+  EXPECT_DOUBLE_EQ(validate::slope(curve, 0, 1), 2);
+  EXPECT_TRUE(std::isnan(validate::slope(curve, 2, 4)));
 }
 
 TEST(Curves, RefuseWhatIsNoNumberNamingTheLine) {
   const auto file = fs::temp_directory_path() / "decant-curve.csv";
   std::ofstream(file) << "# cited\nx,y\n1,2\n2,three\n";
   try {
-    (void)read_curve(file);
+    (void)validate::read_curve(file);
     FAIL();
   } catch (const InputError& error) {
     EXPECT_EQ(error.key(), "line 4");
@@ -133,7 +133,7 @@ TEST(Curves, RefuseWhatIsNoNumberNamingTheLine) {
 TEST(Curves, EveryMeasuredFileIsReadAndCitesItsSource) {
   int files = 0;
   for (const auto& entry : fs::directory_iterator(fixtures / "experiments")) {
-    EXPECT_GE(read_curve(entry.path()).x.size(), 8u) << entry.path();
+    EXPECT_GE(validate::read_curve(entry.path()).x.size(), 8u) << entry.path();
     std::string first;
     std::getline(std::ifstream(entry.path()), first);
     EXPECT_TRUE(first.starts_with("# ")) << entry.path();
@@ -143,9 +143,9 @@ TEST(Curves, EveryMeasuredFileIsReadAndCitesItsSource) {
 }
 
 TEST(Validation, EverySceneHoldsAtEveryResolution) {
-  for (const auto& which : validation_cases())
+  for (const auto& which : validate::cases())
     for (const int resolution : which.resolutions) {
-      const Scene scene = scene_of(which, resolution, fixtures / "scenes");
+      const Scene scene = validate::scene_of(which, resolution, fixtures / "scenes");
       EXPECT_DOUBLE_EQ(scene.particle_spacing, which.length / resolution) << which.name;
       EXPECT_LE(which.quick, which.affordable) << which.name;
     }
@@ -184,8 +184,8 @@ TEST(Validation, ChannelFlowIsJudgedByItsProfile) {
       for (const double t : {0.0, 0.1, 0.3, 0.9}) {
         for (Eigen::Index i = 0; i < run.state.size(); ++i) {
           const double z = run.state.position(2, i);
-          run.state.velocity(0, i) = factor * (name[0] == 'c' ? couette_velocity(0.05, 2e-4, 0.02, z, t)
-                                                              : poiseuille_velocity(0.2, 2e-4, 0.02, z, t));
+          run.state.velocity(0, i) = factor * (name[0] == 'c' ? validate::couette_velocity(0.05, 2e-4, 0.02, z, t)
+                                                              : validate::poiseuille_velocity(0.2, 2e-4, 0.02, z, t));
         }
         run.sample(t);
       }
@@ -200,7 +200,7 @@ TEST(Validation, DropIsJudgedByItsAxes) {
     Staged run("drop");
     const Eigen::Matrix3Xd start = run.state.position;
     for (int k = 0; k <= 38; ++k) {
-      const double t = 0.0002 * k, b = k ? factor * drop_axis(100, t) : 1;
+      const double t = 0.0002 * k, b = k ? factor * validate::drop_axis(100, t) : 1;
       run.state.position.row(0) = start.row(0) / b;
       run.state.position.row(2) = start.row(2) * b;
       run.sample(t);
@@ -212,12 +212,12 @@ TEST(Validation, DropIsJudgedByItsAxes) {
 }
 
 TEST(Validation, DamFrontIsJudgedAgainstTheTable) {
-  const Curve table = read_curve(fixtures / "experiments/martin_moyce_table2_front.csv");
+  const validate::Curve table = validate::read_curve(fixtures / "experiments/martin_moyce_table2_front.csv");
   for (const double factor : {1.0, 1.15}) {
     Staged run("dam-front", 20);
     for (int k = 0; k <= 120; ++k) {
       const double t = 0.002 * k, T = t * std::sqrt(2 * 9.81 / 0.05715);
-      double Z = value_at(table, T);
+      double Z = validate::value_at(table, T);
       if (std::isnan(Z)) Z = T < 1 ? 1.11 : 4.11;
       // A spray particle ahead of the front counts for nothing.
       run.state.position(0, 0) = 0.05715 * factor * Z - 0.5 * run.scene.particle_spacing;
@@ -233,7 +233,7 @@ TEST(Validation, DamFrontIsJudgedAgainstTheTable) {
 
 // What the walls do to the fluid, a patch of all of them gets back.
 TEST(Validation, WallPatchFeelsTheReactionToWallPressure) {
-  const Scene scene = scene_of(case_named("still-tank"), 10, fixtures / "scenes");
+  const Scene scene = validate::scene_of(case_named("still-tank"), 10, fixtures / "scenes");
   const Walls walls = sample_walls(scene);
   ParticleState state = initial_state(scene);
   state.position.row(2).array() -= 0.2 * scene.particle_spacing;
@@ -242,7 +242,7 @@ TEST(Validation, WallPatchFeelsTheReactionToWallPressure) {
   solver.fields(fields);
   const SolidBox below{{-1, -1, -1}, {1, 1, 0}};
   // The floor reaches under the side walls: every wall particle below z = 0 is in the patch.
-  const WallPatch patch(scene, walls, below, {0, 0, -1});
+  const validate::WallPatch patch(scene, walls, below, {0, 0, -1});
   double force = 0;
   const PosedWalls posed = pose_walls(scene, walls, 0);
   const PosedWalls only = [&] {
@@ -263,8 +263,8 @@ TEST(Validation, WallPatchFeelsTheReactionToWallPressure) {
 }
 
 TEST(Validation, WallPatchRefusesASpotWithoutWall) {
-  const Scene scene = scene_of(case_named("still-tank"), 10, fixtures / "scenes");
-  EXPECT_THROW(WallPatch(scene, sample_walls(scene), {{0.02, 0.02, 0.02}, {0.03, 0.03, 0.03}}, {1, 0, 0}),
+  const Scene scene = validate::scene_of(case_named("still-tank"), 10, fixtures / "scenes");
+  EXPECT_THROW(validate::WallPatch(scene, sample_walls(scene), {{0.02, 0.02, 0.02}, {0.03, 0.03, 0.03}}, {1, 0, 0}),
                std::runtime_error);
 }
 
@@ -293,7 +293,7 @@ TEST(Validation, SlowPourIsJudgedByItsResidual) {
     const double holds[][3] = {{1.2, 5.2, 15}, {6.2, 14.2, 30}, {15.2, 25.2, 45}, {26.2, 40.2, 60}};
     run.sample(0);
     for (const auto& [from, to, degrees] : holds) {
-      const double volume = factor * cup_residual(0.035, 0.09, degrees * std::numbers::pi / 180);
+      const double volume = factor * validate::cup_residual(0.035, 0.09, degrees * std::numbers::pi / 180);
       const auto inside = std::min<Eigen::Index>(run.state.size(), std::lround(volume / each));
       // Those inside turn with the cup, the others lie in the tray.
       const Pose pose = pose_at(run.scene.containers[0], to), first = pose_at(run.scene.containers[0], 0);
@@ -312,20 +312,20 @@ TEST(Validation, SlowPourIsJudgedByItsResidual) {
 }
 
 TEST(Validation, OrdersComeFromNeighboringResolutions) {
-  std::vector<ValidationResult> results(3);
+  std::vector<validate::Result> results(3);
   for (int k = 0; k < 3; ++k) {
     results[static_cast<std::size_t>(k)].name = "case";
     results[static_cast<std::size_t>(k)].resolution = 10 << k;
     results[static_cast<std::size_t>(k)].add({"error", "1", 0, 0, 0.16 / (1 << (2 * k))});
   }
-  const auto orders = observed_orders(results);
+  const auto orders = validate::observed_orders(results);
   ASSERT_EQ(orders.size(), 2u);
   EXPECT_NEAR(orders[0].order, 2, 1e-12);
   EXPECT_EQ(orders[1].fine, 40);
 }
 
 TEST(Validation, ReportHoldsFiguresAndCurves) {
-  ValidationResult result;
+  validate::Result result;
   result.name = "case";
   result.resolution = 20;
   result.add({"right", "1", 1, 1.01, 0.01, 0.02});
@@ -334,22 +334,22 @@ TEST(Validation, ReportHoldsFiguresAndCurves) {
   result.curves.push_back({"panel", "found", "x", "m", "y", "Pa", false, {0, 1}, {2, 3}});
   EXPECT_FALSE(result.passed());
   const auto file = fs::temp_directory_path() / "decant-validation.h5";
-  write_validation(file, {result});
+  validate::write(file, {result});
   const Hdf5Reader in(file);
   EXPECT_EQ(in.strings("/quantities/verdict"), (std::vector<std::string>{"pass", "fail", "reported"}));
   EXPECT_EQ(in.vector("/curves/0000/y"), Eigen::Vector2d(2, 3));
   EXPECT_EQ(in.text_attribute("/curves/0000/y", "unit"), "Pa");
-  const std::string table = validation_table({result});
+  const std::string table = validate::table({result});
   EXPECT_NE(table.find("5.00 %    2.00 %  fail"), std::string::npos) << table;
   fs::remove(file);
 }
 
 TEST(Validation, FreeFallOfTheOracleItselfKeepsItsCentre) {
   const auto& which = case_named("free-fall");
-  const Scene scene = scene_of(which, 5, fixtures / "scenes");
+  const Scene scene = validate::scene_of(which, 5, fixtures / "scenes");
   const auto backend = make_reference_backend();
-  const auto result = run_case(which, 5, scene, *backend, fixtures / "experiments");
-  EXPECT_TRUE(result.passed()) << validation_table({result});
+  const auto result = validate::run(which, 5, scene, *backend, fixtures / "experiments");
+  EXPECT_TRUE(result.passed()) << validate::table({result});
   EXPECT_GT(result.substeps, 100);
 }
 

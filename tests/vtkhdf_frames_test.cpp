@@ -65,17 +65,17 @@ std::vector<std::int64_t> integers_of(const fs::path& file, const std::string& p
 std::vector<double> some_times() { return {0.0, 0.1, 0.2, 0.30000000000000004}; }
 
 /// A pour's frame file of numbers that are all different, and what describes it.
-FrameLayout write_frames(const fs::path& folder, std::int64_t n = particles) {
+frames::Layout write_frames(const fs::path& folder, std::int64_t n = particles) {
   const Scene scene = test::falling_points_scene(frames - 1);
-  const FrameLayout layout = frame_layout(scene, n);
-  FrameFile file = FrameFile::create(folder / "frames.h5", scene, layout, {});
+  const frames::Layout layout = frames::layout_of(scene, n);
+  frames::File file = frames::File::create(folder / "frames.h5", scene, layout, {});
   float next = 1.0f;
   const auto fill = [&](std::vector<float>& values, std::int64_t size) {
     values.resize(static_cast<std::size_t>(size));
     for (float& value : values) value = next += 0.1f;
   };
   for (std::int64_t t = 0; t < frames; ++t) {
-    Frame frame;
+    frames::Frame frame;
     frame.index = t;
     frame.time = some_times()[static_cast<std::size_t>(t)];
     fill(frame.position, 3 * n);
@@ -83,12 +83,12 @@ FrameLayout write_frames(const fs::path& folder, std::int64_t n = particles) {
     fill(frame.density, n);
     fill(frame.pressure, n);
     for (std::int64_t i = 0; i < n; ++i) frame.place.push_back(static_cast<std::uint8_t>((t + i) % 5));
-    for (const RenderWall& wall : layout.walls)
+    for (const frames::RenderWall& wall : layout.walls)
       if (wall.moving) fill(frame.wall.emplace_back(), 3 * wall.surface.vertex.cols());
     file.write(frame);
   }
-  write_frames_vtkhdf(folder / "frames.vtkhdf", layout, some_times(), "frames.h5");
-  write_walls_vtkhdf(folder / "walls.vtkhdf", layout, some_times(), "frames.h5");
+  frames::write_fluid_vtkhdf(folder / "frames.vtkhdf", layout, some_times(), "frames.h5");
+  frames::write_walls_vtkhdf(folder / "walls.vtkhdf", layout, some_times(), "frames.h5");
   return layout;
 }
 
@@ -201,18 +201,18 @@ TEST(FramesVtkHdf, IsWrittenForAPourWithoutParticles) {
 
 TEST(FramesVtkHdf, IsRefusedWhereTimesAreMissing) {
   const TemporaryFolder folder;
-  const FrameLayout layout = frame_layout(test::falling_points_scene(frames - 1), particles);
-  EXPECT_THROW(write_frames_vtkhdf(folder / "f.vtkhdf", layout, {0.0}, "frames.h5"), std::runtime_error);
+  const frames::Layout layout = frames::layout_of(test::falling_points_scene(frames - 1), particles);
+  EXPECT_THROW(frames::write_fluid_vtkhdf(folder / "f.vtkhdf", layout, {0.0}, "frames.h5"), std::runtime_error);
   EXPECT_TRUE(fs::is_empty(folder / ""));
 }
 
 TEST(WallsVtkHdf, ShowsTheTrianglesOfEveryWallAndEveryFrameOfTheMovingOnes) {
   const TemporaryFolder folder;
-  const FrameLayout layout = write_frames(folder / "");
+  const frames::Layout layout = write_frames(folder / "");
   const fs::path file = folder / "walls.vtkhdf";
   ASSERT_EQ(layout.walls.size(), 2u);
   for (std::size_t w = 0; w < layout.walls.size(); ++w) {
-    const RenderWall& wall = layout.walls[w];
+    const frames::RenderWall& wall = layout.walls[w];
     const std::string group = "/VTKHDF/wall_" + wall.name, source = "/walls/" + wall.name;
     EXPECT_EQ(wall.moving, w == 0);
     EXPECT_EQ(Hdf5Reader(file).integer_attribute(group, "Index"), static_cast<std::int64_t>(w));

@@ -97,13 +97,13 @@ std::string json_text(const ReportDiff& diff, int status) {
 int diff_pours(const DiffArguments& arguments) {
   if (!arguments.pairs.empty())
     throw InputError("command line", "--pair", arguments.pairs[0], "two reports: it pairs their backends");
-  const PourDiff found =
-      pour_difference(arguments.before, arguments.after, {arguments.spread.begin(), arguments.spread.end()},
-                      arguments.factor > 0 ? arguments.factor : PourDiff{}.factor);
+  const pour::Difference found =
+      pour::difference(arguments.before, arguments.after, {arguments.spread.begin(), arguments.spread.end()},
+                       arguments.factor > 0 ? arguments.factor : pour::Difference{}.factor);
   const int status = found.within() ? exit_pass : exit_does_not_conform;
-  if (arguments.json) fmt::print("{}\n", pour_diff_json(found, status));
-  else if (arguments.quiet) fmt::print("{}\n", pour_diff_line(found));
-  else fmt::print("{}", pour_diff_text(found));
+  if (arguments.json) fmt::print("{}\n", pour::difference_json(found, status));
+  else if (arguments.quiet) fmt::print("{}\n", pour::difference_line(found));
+  else fmt::print("{}", pour::difference_text(found));
   return status;
 }
 
@@ -141,7 +141,7 @@ int diff(const DiffArguments& arguments) {
   for (const std::string& path : {arguments.before, arguments.after})
     if (std::error_code ignored; !std::filesystem::exists(path, ignored))
       throw InputError(path, "file", "not found", "a report (*.h5) or a pour's folder");
-  const bool before = is_pour(arguments.before), after = is_pour(arguments.after);
+  const bool before = pour::is_pour(arguments.before), after = pour::is_pour(arguments.after);
   if (before != after)
     throw InputError(before ? arguments.after : arguments.before, "kind", "no pour",
                      fmt::format("a pour, as {} is; or two reports", before ? arguments.before : arguments.after));

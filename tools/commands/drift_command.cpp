@@ -118,7 +118,7 @@ std::vector<Fixture> phases_of(const Scene& scene) {
   return states;
 }
 
-void print(const Recommendation* best, double tolerance, std::size_t windows) {
+void print(const drift::Recommendation* best, double tolerance, std::size_t windows) {
   if (!best) {
     fmt::print("\nno list measured stays within {:g}, not even the adaptive one\n", tolerance);
     return;
@@ -145,11 +145,11 @@ void print(const Recommendation* best, double tolerance, std::size_t windows) {
 void run(DriftArguments& arguments, int& exit_status) {
   check(arguments);
   if (!arguments.series.empty()) {
-    const DriftResult result =
-        measure_series(read_fixture(recording_called(arguments.inputs.front())), arguments.series);
-    fmt::print("{}", drift_table({result}));
+    const drift::Result result =
+        drift::measure_series(read_fixture(recording_called(arguments.inputs.front())), arguments.series);
+    fmt::print("{}", drift::table({result}));
     if (!arguments.report.empty())
-      write_drift(arguments.report, {result}, {}, {"series", "", "given", "unknown", "unknown"});
+      drift::write(arguments.report, {result}, {}, {"series", "", "given", "unknown", "unknown"});
     exit_status = exit_pass;
     return;
   }
@@ -158,7 +158,7 @@ void run(DriftArguments& arguments, int& exit_status) {
   };
   const BackendInfo info = make_list("")->info();
   if (arguments.inputs.empty()) arguments.inputs = default_fixtures();
-  DriftPlan plan{all_lists(arguments.intervals, arguments.skins), arguments.window, !arguments.untimed};
+  drift::Plan plan{drift::all_lists(arguments.intervals, arguments.skins), arguments.window, !arguments.untimed};
   std::vector<Fixture> states;
   std::vector<Scene> scenes;
   for (const auto& file : arguments.inputs) {
@@ -172,32 +172,32 @@ void run(DriftArguments& arguments, int& exit_status) {
   }
   if (arguments.whole && scenes.empty())
     throw InputError("command line", "--full-run", "given", "with a scene (*.json)");
-  std::vector<PourDrift> pours;
-  std::vector<DriftResult> results;
+  std::vector<drift::PourResult> pours;
+  std::vector<drift::Result> results;
   Interruptible work([&] {
     if (!arguments.quiet) fmt::print(stderr, "\n");
     const std::string line = interrupted_line(static_cast<std::int64_t>(results.size()),
                                               static_cast<std::int64_t>(states.size()), "windows measured");
-    fmt::print("{}{}{}\n", drift_table(results), pour_table(pours), line);
+    fmt::print("{}{}{}\n", drift::table(results), drift::pour_table(pours), line);
     std::fflush(stdout);
-    if (!arguments.report.empty()) write_drift(arguments.report, results, pours, info, line);
+    if (!arguments.report.empty()) drift::write(arguments.report, results, pours, info, line);
   });
   for (const Scene& scene : scenes) {
     Progress progress("pour", 1, 0, arguments.quiet);
     progress.update(0, scene.name);
     std::vector<Fixture> phases = phases_of(scene);
-    PourDrift pour;
-    work.part([&] { pour = along_pour(scene, plan, arguments.samples, make_list, phases); });
+    drift::PourResult pour;
+    work.part([&] { pour = drift::along_pour(scene, plan, arguments.samples, make_list, phases); });
     pours.push_back(std::move(pour));
     for (Fixture& phase : phases) states.push_back(std::move(phase));
     if (arguments.whole)
-      whole_pours(
+      drift::whole_pours(
           scene, plan, perturbed_pours, make_list, [&](const auto& part) { work.part(part); }, pours.back().whole);
     progress.update(1, scene.name);
   }
   if (arguments.recommend)
-    for (const ListChoice& list : derived_lists(states, arguments.intervals, 0.5 * arguments.tolerance))
-      if (std::none_of(plan.lists.begin(), plan.lists.end(), [&](const ListChoice& other) {
+    for (const drift::ListChoice& list : drift::derived_lists(states, arguments.intervals, 0.5 * arguments.tolerance))
+      if (std::none_of(plan.lists.begin(), plan.lists.end(), [&](const drift::ListChoice& other) {
             return other.interval == list.interval && other.skin == list.skin;
           }))
         plan.lists.push_back(list);
@@ -205,9 +205,9 @@ void run(DriftArguments& arguments, int& exit_status) {
     Progress progress("window", static_cast<std::int64_t>(states.size()), 0, arguments.quiet);
     for (const Fixture& state : states) {
       progress.update(static_cast<std::int64_t>(results.size()), state.name);
-      DriftResult result;
+      drift::Result result;
       work.part([&] {
-        result = measure_drift(state, plan, make_list, [&](double part) {
+        result = drift::measure(state, plan, make_list, [&](double part) {
           progress.update(static_cast<std::int64_t>(results.size()), state.name, part);
         });
       });
@@ -215,11 +215,11 @@ void run(DriftArguments& arguments, int& exit_status) {
     }
     progress.update(static_cast<std::int64_t>(results.size()));
   }
-  fmt::print("{}{}", drift_table(results), pour_table(pours));
-  if (!arguments.report.empty()) write_drift(arguments.report, results, pours, info);
+  fmt::print("{}{}", drift::table(results), drift::pour_table(pours));
+  if (!arguments.report.empty()) drift::write(arguments.report, results, pours, info);
   exit_status = exit_pass;
   if (!arguments.recommend) return;
-  const auto best = recommend(results, arguments.tolerance);
+  const auto best = drift::recommend(results, arguments.tolerance);
   print(best.get(), arguments.tolerance, results.size());
   if (!best) exit_status = exit_does_not_conform;
 }

@@ -60,7 +60,7 @@ Scene scene_of(const PourArguments& arguments) {
   if (arguments.particles) scene = with_asked_particles(scene, *arguments.particles, arguments.scene);
   if (arguments.frames) {
     at_least_one("--frames", *arguments.frames, 1'000'000);
-    scene = with_frames(scene, static_cast<int>(*arguments.frames));
+    scene = pour::with_frames(scene, static_cast<int>(*arguments.frames));
   }
   const auto warnings = check_scene(scene, arguments.scene);
   if (!arguments.quiet)
@@ -75,8 +75,8 @@ int run(PourArguments& arguments) {
   arguments.flags.require_used();
   const StopSignal signal;
   const BackendInfo info = backend->info();
-  const auto tell_stopped = [&](const PourResult& result) {
-    if (arguments.json && result.frame >= 0) fmt::print("{}\n", pour_json(result, info, arguments.out));
+  const auto tell_stopped = [&](const pour::Result& result) {
+    if (arguments.json && result.frame >= 0) fmt::print("{}\n", pour::result_json(result, info, arguments.out));
     std::fflush(stdout);
     if (!arguments.quiet && result.frame < 0) fmt::print(stderr, "stopped before the first frame; nothing is kept\n");
     else if (!arguments.quiet)
@@ -84,19 +84,19 @@ int run(PourArguments& arguments) {
                  result.frame, scene.schedule.frames, result.substep);
     return 128 + StopSignal::caught();
   };
-  PourOptions options;
+  pour::Options options;
   options.out = arguments.out;
   options.csv = arguments.csv;
   options.perturbation = arguments.perturbation;
   options.resume = arguments.resume;
   options.quiet = arguments.quiet;
   options.stop = [] { return StopSignal::caught() != 0; };
-  options.leave = [&](const PourResult& result) { std::_Exit(tell_stopped(result)); };
-  const PourResult result = pour(scene, *backend, options);
+  options.leave = [&](const pour::Result& result) { std::_Exit(tell_stopped(result)); };
+  const pour::Result result = pour::run(scene, *backend, options);
 
   if (!result.finished) return tell_stopped(result);
-  if (arguments.json) fmt::print("{}\n", pour_json(result, info, arguments.out));
-  else if (!arguments.quiet) print_pour(result, info, scene);
+  if (arguments.json) fmt::print("{}\n", pour::result_json(result, info, arguments.out));
+  else if (!arguments.quiet) pour::print_result(result, info, scene);
   const bool conforms = result.summary.balanced() && !result.summary.penetrated();
   return conforms ? exit_pass : exit_does_not_conform;
 }

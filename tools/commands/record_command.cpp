@@ -122,7 +122,7 @@ Start start_of(const RecordArguments& arguments, const Scene& scene) {
     taken.provenance = std::move(fixture.provenance);
     return taken;
   }
-  Checkpoint checkpoint = read_checkpoint(file);
+  pour::Checkpoint checkpoint = pour::read_checkpoint(file);
   return take(std::move(checkpoint.state), checkpoint.scene_json, {});
 }
 
@@ -155,7 +155,7 @@ std::vector<Phase> phases_of(const RecordArguments& arguments, const Scene& scen
 /// \param density  N, kg/m³, the oracle's
 std::vector<std::string> beyond_limits(const Scene& scene, const ParticleState& state, const Eigen::VectorXd& density) {
   if (state.size() == 0) return {};
-  TimelineRow row;
+  pour::TimelineRow row;
   Eigen::Index fastest = -1, densest = -1;
   row.frame = state.substep / scene.schedule.substeps_per_frame;
   row.max_speed = state.velocity.colwise().norm().maxCoeff(&fastest);
@@ -163,7 +163,7 @@ std::vector<std::string> beyond_limits(const Scene& scene, const ParticleState& 
   row.fastest_particle = fastest;
   row.densest_particle = densest;
   std::vector<std::string> all;
-  for (const LimitExceeded& e : limits_exceeded({row}, limits_of(scene))) all.push_back(describe(e));
+  for (const pour::LimitExceeded& e : pour::limits_exceeded({row}, limits_of(scene))) all.push_back(describe(e));
   return all;
 }
 

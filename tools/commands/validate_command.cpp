@@ -46,10 +46,10 @@ constexpr const char* footer =
     "  build/venv/bin/python tools/python/validation_page.py build/validation.h5 \\\n"
     "    --out build/validation";
 
-std::vector<const ValidationCase*> chosen_cases(const std::vector<std::string>& names) {
-  std::vector<const ValidationCase*> chosen;
+std::vector<const validate::Case*> chosen_cases(const std::vector<std::string>& names) {
+  std::vector<const validate::Case*> chosen;
   std::string known;
-  for (const auto& which : validation_cases()) {
+  for (const auto& which : validate::cases()) {
     known += (known.empty() ? "" : ", ") + which.name;
     if (names.empty() || std::find(names.begin(), names.end(), which.name) != names.end()) chosen.push_back(&which);
   }
@@ -59,7 +59,7 @@ std::vector<const ValidationCase*> chosen_cases(const std::vector<std::string>& 
   return chosen;
 }
 
-std::vector<int> resolutions_of(const ValidationCase& which, const ValidateArguments& arguments,
+std::vector<int> resolutions_of(const validate::Case& which, const ValidateArguments& arguments,
                                 const std::string& executor) {
   if (!arguments.resolutions.empty()) return arguments.resolutions;
   if (arguments.quick) return which.quick > 0 ? std::vector<int>{which.quick} : std::vector<int>{};
@@ -69,7 +69,7 @@ std::vector<int> resolutions_of(const ValidationCase& which, const ValidateArgum
 }
 
 void print_list() {
-  for (const auto& which : validation_cases()) {
+  for (const auto& which : validate::cases()) {
     std::string resolutions;
     for (const int n : which.resolutions) resolutions += (resolutions.empty() ? "" : ", ") + std::to_string(n);
     fmt::print("{:<13} {}\n{:<13} {}; {} particles along {:g} m{}\n", which.name, which.title, "", which.source,
@@ -88,17 +88,17 @@ void run(ValidateArguments& arguments, int& exit_status) {
   const auto fixtures = fixture_folder();
   const auto backend = choose_backend(arguments.flags.applied_to(arguments.backend), arguments.executor);
   arguments.flags.require_used();
-  std::vector<std::pair<const ValidationCase*, int>> runs;
-  for (const ValidationCase* which : chosen)
+  std::vector<std::pair<const validate::Case*, int>> runs;
+  for (const validate::Case* which : chosen)
     for (const int resolution : resolutions_of(*which, arguments, backend->info().executor))
       runs.emplace_back(which, resolution);
   if (runs.empty())
     throw InputError("command line", "CASE", "none", "a case that this executor affords unasked; name a --resolution");
-  std::vector<ValidationResult> results;
+  std::vector<validate::Result> results;
   std::int64_t done = 0;
   int broken = 0, gates = 0, met = 0;
   const auto conclude = [&](const std::string& interrupted) {
-    fmt::print("{}", validation_table(results));
+    fmt::print("{}", validate::table(results));
     for (const auto& result : results)
       for (const auto& quantity : result.quantities) {
         gates += quantity.gated();
@@ -107,22 +107,22 @@ void run(ValidateArguments& arguments, int& exit_status) {
     fmt::print("\n{} of {} gates met{}\n", met, gates, broken ? fmt::format("; {} broke down", broken) : "");
     if (!interrupted.empty()) fmt::print("{}\n", interrupted);
     std::fflush(stdout);
-    if (!arguments.report.empty()) write_validation(arguments.report, results, interrupted);
+    if (!arguments.report.empty()) validate::write(arguments.report, results, interrupted);
   };
   Interruptible work([&] {
     if (!arguments.quiet) fmt::print(stderr, "\n");
     conclude(interrupted_line(done, static_cast<std::int64_t>(runs.size()), "runs judged"));
   });
   for (const auto& one : runs) {
-    const ValidationCase& which = *one.first;
+    const validate::Case& which = *one.first;
     const int resolution = one.second;
-    const Scene scene = scene_of(which, resolution, fixtures / "scenes");
+    const Scene scene = validate::scene_of(which, resolution, fixtures / "scenes");
     Progress progress(fmt::format("{}/{} frame", which.name, resolution), scene.schedule.frames, 0, arguments.quiet);
     try {
-      ValidationResult result;
+      validate::Result result;
       work.part([&] {
-        result = run_case(which, resolution, scene, *backend, fixtures / "experiments",
-                          [&](int frame) { progress.update(frame); });
+        result = validate::run(which, resolution, scene, *backend, fixtures / "experiments",
+                               [&](int frame) { progress.update(frame); });
       });
       results.push_back(std::move(result));
     } catch (const BackendError& trouble) {

@@ -19,7 +19,7 @@
 #include <string>
 #include <vector>
 
-namespace decant {
+namespace decant::drift {
 
 inline constexpr double not_measured = std::numeric_limits<double>::quiet_NaN();
 
@@ -32,7 +32,8 @@ struct ListChoice {
   std::string options() const;  // of the backend `list`
 };
 
-struct DriftPlan {
+/// Which lists are held to all pairs, and for how long.
+struct Plan {
   std::vector<ListChoice> lists;  // intervals >= 1
   int window = 50;                // substeps
   bool timed = true;              // false: no list is run to be timed and followed
@@ -42,7 +43,7 @@ struct DriftPlan {
 std::vector<ListChoice> all_lists(const std::vector<int>& intervals, const std::vector<double>& skins);
 
 /// One list at one substep of the window.
-struct DriftSample {
+struct Sample {
   ListChoice list;
   std::int64_t substep;  // of the window, or of the scene
   Staleness stale;
@@ -50,7 +51,7 @@ struct DriftSample {
 };
 
 /// One list over the window, and what it costs.
-struct DriftRow {
+struct Row {
   std::string fixture;
   ListChoice list;
   double missed_share = 0, worst_missed_share = 0;   // of the pairs within H; mean over the window, largest
@@ -98,12 +99,13 @@ struct WholePour {
   double rebuild_every = not_measured;  // substeps
 };
 
-struct DriftResult {
+/// What was measured from one state.
+struct Result {
   std::string fixture;
   double particle_spacing = 0, support_radius = 0;  // m
   std::int64_t particles = 0;
-  std::vector<DriftSample> samples;
-  std::vector<DriftRow> rows;
+  std::vector<Sample> samples;
+  std::vector<Row> rows;
   std::vector<SafeInterval> safe;
   /// Powers with which what a list without skin misses grows with how far neighbors moved against each
   /// other since the build: missed pairs, mean deficit of density, of acceleration. Beside them theory's.
@@ -115,10 +117,11 @@ struct DriftResult {
 /// One list at one moment of a pour, at the last substep before it would be rebuilt.
 struct PourMoment {
   double time;  // s
-  DriftSample sample;
+  Sample sample;
 };
 
-struct PourDrift {
+/// What was measured along one scene, and what became of whole pours of it.
+struct PourResult {
   std::string fixture;
   std::vector<PourMoment> moments;
   std::vector<WholePour> whole;
@@ -131,16 +134,16 @@ using ListMaker = std::function<std::unique_ptr<Backend>(const std::string& opti
 void require_ok(const Backend& backend, const Status& status);
 
 /// Means and worst of one list's samples.
-DriftRow summed_up(const std::string& fixture, const std::vector<DriftSample>& samples);
+Row summed_up(const std::string& fixture, const std::vector<Sample>& samples);
 
 /// Measures one window. \param fixture  its recorded fields are not needed; \param progress  called now and then, from
 /// one thread at a time, with the part that is done, 0 … 1
-DriftResult measure_drift(const Fixture& fixture, const DriftPlan& plan, const ListMaker& make_list,
-                          const std::function<void(double)>& progress = {});
+Result measure(const Fixture& fixture, const Plan& plan, const ListMaker& make_list,
+               const std::function<void(double)>& progress = {});
 
 /// Times every list from the fixture's state and follows it beside complete ones.
 void time_and_follow(const Fixture& fixture, const Walls& walls, int window, const ListMaker& make_list,
-                     DriftResult& result);
+                     Result& result);
 
 /// For each interval the smallest skin that theory expects to stay within the tolerance in every one of
 /// these states, rounded up to 0.01.
@@ -149,20 +152,20 @@ std::vector<ListChoice> derived_lists(const std::vector<Fixture>& fixtures, cons
 
 /// Runs a scene with complete lists; at `samples` moments what each list would miss just before its rebuild,
 /// and the state at each of `phases`.
-PourDrift along_pour(const Scene& scene, const DriftPlan& plan, int samples, const ListMaker& make_list,
-                     std::vector<Fixture>& phases);
+PourResult along_pour(const Scene& scene, const Plan& plan, int samples, const ListMaker& make_list,
+                      std::vector<Fixture>& phases);
 
 /// Does one part of long work: calls what it is given, or never returns.
 using DoPart = std::function<void(const std::function<void()>& part)>;
 
 /// The whole pour by complete lists, by `perturbed` more whose start differs by rounding, and by each list.
 /// They are added to `pours` one by one, each run a part of the work.
-void whole_pours(const Scene& scene, const DriftPlan& plan, int perturbed, const ListMaker& make_list,
-                 const DoPart& do_part, std::vector<WholePour>& pours);
+void whole_pours(const Scene& scene, const Plan& plan, int perturbed, const ListMaker& make_list, const DoPart& do_part,
+                 std::vector<WholePour>& pours);
 
 /// A run by another program: states, and the list that it used at each. Layout in
 /// oracle/formats/list-series.md. Throws InputError.
-DriftResult measure_series(const Fixture& fixture, const std::filesystem::path& series);
+Result measure_series(const Fixture& fixture, const std::filesystem::path& series);
 
 /// The cheapest list whose acceleration stays within half of `tolerance` (relative RMS) at every substep of
 /// every window measured: states between the measured ones may be worse. Null where none is.
@@ -172,14 +175,14 @@ struct Recommendation {
   double next_us = not_measured;  // of the list that errs least among the faster ones
   double next_error = not_measured;
 };
-std::unique_ptr<Recommendation> recommend(const std::vector<DriftResult>& results, double tolerance);
+std::unique_ptr<Recommendation> recommend(const std::vector<Result>& results, double tolerance);
 
 /// Tables for people.
-std::string drift_table(const std::vector<DriftResult>& results);
-std::string pour_table(const std::vector<PourDrift>& pours);
+std::string table(const std::vector<Result>& results);
+std::string pour_table(const std::vector<PourResult>& pours);
 
 /// Layout in oracle/formats/drift.md. \param interrupted  how far the work came; empty: it is complete
-void write_drift(const std::filesystem::path& file, const std::vector<DriftResult>& results,
-                 const std::vector<PourDrift>& pours, const BackendInfo& backend, const std::string& interrupted = {});
+void write(const std::filesystem::path& file, const std::vector<Result>& results, const std::vector<PourResult>& pours,
+           const BackendInfo& backend, const std::string& interrupted = {});
 
-}  // namespace decant
+}  // namespace decant::drift

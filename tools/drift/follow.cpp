@@ -12,7 +12,7 @@
 #include <chrono>
 #include <cmath>
 
-namespace decant {
+namespace decant::drift {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -36,7 +36,7 @@ void load_grown(const Fixture& fixture, const Walls& walls, Backend& list) {
 }
 
 /// The backend's own account of a window. Not while it is timed: counting costs more than a substep.
-void count_missed(const Fixture& fixture, const Walls& walls, Backend& list, int window, DriftRow& row) {
+void count_missed(const Fixture& fixture, const Walls& walls, Backend& list, int window, Row& row) {
   load_grown(fixture, walls, list);
   require_ok(list, list.advance(window));
   const PairTotals counted = list.neighbor_stats().verified;
@@ -51,7 +51,7 @@ std::string verified(const ListChoice& list) {
 }
 
 /// Where the fluid is after the ensemble's substeps, and the time of a substep in the window after.
-ParticleState follow_one(const Fixture& fixture, const Walls& walls, Backend& list, int window, DriftRow& row) {
+ParticleState follow_one(const Fixture& fixture, const Walls& walls, Backend& list, int window, Row& row) {
   const auto substeps = fixture.ensemble.members > 0 ? static_cast<int>(fixture.ensemble.substeps) : window;
   load_grown(fixture, walls, list);
   require_ok(list, list.advance(substeps));  // records, too
@@ -134,10 +134,10 @@ void compare(const Course& right, Course& course) {
 }  // namespace
 
 void time_and_follow(const Fixture& fixture, const Walls& walls, int window, const ListMaker& make_list,
-                     DriftResult& result) {
+                     Result& result) {
   const auto start = Clock::now();
   const Scene& scene = fixture.scene;
-  DriftRow adaptive;
+  Row adaptive;
   adaptive.fixture = fixture.name;
   adaptive.list = {0, not_measured, false};
   adaptive.first_miss = adaptive.proved_until = 0;
@@ -145,7 +145,7 @@ void time_and_follow(const Fixture& fixture, const Walls& walls, int window, con
   adaptive.deviation = adaptive.deviation_over_ensemble = 0;
   adaptive.energy_drift = adaptive.momentum_drift = 0;
   count_missed(fixture, walls, *make_list(verified(adaptive.list)), window, adaptive);
-  for (DriftRow& row : result.rows) {
+  for (Row& row : result.rows) {
     const auto list = make_list(row.list.options());
     const ParticleState end = follow_one(fixture, walls, *list, window, row);
     const Divergence away = divergence(scene, end, right);
@@ -159,8 +159,8 @@ void time_and_follow(const Fixture& fixture, const Walls& walls, int window, con
   result.run_seconds = seconds_since(start);
 }
 
-void whole_pours(const Scene& scene, const DriftPlan& plan, int perturbed, const ListMaker& make_list,
-                 const DoPart& do_part, std::vector<WholePour>& pours) {
+void whole_pours(const Scene& scene, const Plan& plan, int perturbed, const ListMaker& make_list, const DoPart& do_part,
+                 std::vector<WholePour>& pours) {
   const Walls walls = sample_walls(scene);
   const ParticleState start = initial_state(scene);
   const auto run = [&](const ParticleState& from, const ListChoice& list) {
@@ -180,7 +180,7 @@ void whole_pours(const Scene& scene, const DriftPlan& plan, int perturbed, const
   compare(right, right);
   add(right, complete, 0);
   for (int k = 1; k <= perturbed; ++k) {
-    Course course = run(perturbed_start(start, static_cast<std::uint32_t>(k)), complete);
+    Course course = run(pour::perturbed_start(start, static_cast<std::uint32_t>(k)), complete);
     compare(right, course);
     add(std::move(course), complete, static_cast<std::uint32_t>(k));
   }
@@ -191,4 +191,4 @@ void whole_pours(const Scene& scene, const DriftPlan& plan, int perturbed, const
   }
 }
 
-}  // namespace decant
+}  // namespace decant::drift

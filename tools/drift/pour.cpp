@@ -11,10 +11,10 @@
 #include <cmath>
 #include <set>
 
-namespace decant {
+namespace decant::drift {
 
-PourDrift along_pour(const Scene& scene, const DriftPlan& plan, int samples, const ListMaker& make_list,
-                     std::vector<Fixture>& phases) {
+PourResult along_pour(const Scene& scene, const Plan& plan, int samples, const ListMaker& make_list,
+                      std::vector<Fixture>& phases) {
   const Walls walls = sample_walls(scene);
   const WallSolution volumes = wall_solution(scene, walls);
   const std::int64_t all = std::int64_t{scene.schedule.frames} * scene.schedule.substeps_per_frame;
@@ -42,7 +42,7 @@ PourDrift along_pour(const Scene& scene, const DriftPlan& plan, int samples, con
     }
   };
 
-  PourDrift pour;
+  PourResult pour;
   pour.fixture = scene.name;
   for (int sample = 0; sample < samples; ++sample) {
     const std::int64_t built = all * sample / samples;
@@ -74,4 +74,4 @@ PourDrift along_pour(const Scene& scene, const DriftPlan& plan, int samples, con
   return pour;
 }
 
-}  // namespace decant
+}  // namespace decant::drift

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-namespace decant {
+namespace decant::drift {
 
 struct PowerFit {
   double power = std::numeric_limits<double>::quiet_NaN();
@@ -39,4 +39,4 @@ inline PowerFit fit_power(const std::vector<std::pair<double, double>>& points) 
   return {slope, t * std::sqrt(left / xx)};
 }
 
-}  // namespace decant
+}  // namespace decant::drift

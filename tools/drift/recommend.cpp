@@ -6,12 +6,12 @@
 #include <cmath>
 #include <vector>
 
-namespace decant {
+namespace decant::drift {
 namespace {
 
 /// The row of that list; all adaptive lists are one.
-const DriftRow* same_list(const DriftResult& result, const ListChoice& list) {
-  for (const DriftRow& row : result.rows)
+const Row* same_list(const Result& result, const ListChoice& list) {
+  for (const Row& row : result.rows)
     if (row.list.interval == list.interval && (list.interval == 0 || row.list.skin == list.skin)) return &row;
   return nullptr;
 }
@@ -21,17 +21,17 @@ double larger(double a, double b) { return !(b <= a) ? b : a; }
 
 }  // namespace
 
-std::unique_ptr<Recommendation> recommend(const std::vector<DriftResult>& results, double tolerance) {
+std::unique_ptr<Recommendation> recommend(const std::vector<Result>& results, double tolerance) {
   std::unique_ptr<Recommendation> best;
   if (results.empty()) return best;
   const auto parts = static_cast<double>(results.size());
   std::vector<Recommendation> beyond;
-  for (const DriftRow& candidate : results.front().rows) {
+  for (const Row& candidate : results.front().rows) {
     Recommendation r{candidate.list, 0, 0, 0, 0};
     bool everywhere = true;
-    for (const DriftResult& result : results) {
-      const DriftRow* row = same_list(result, candidate.list);
-      const DriftRow* adaptive = same_list(result, {0, not_measured, false});
+    for (const Result& result : results) {
+      const Row* row = same_list(result, candidate.list);
+      const Row* adaptive = same_list(result, {0, not_measured, false});
       everywhere = everywhere && row && adaptive && !std::isnan(row->substep_us);
       if (!everywhere) break;
       r.worst_error = larger(r.worst_error, row->acceleration_rms);
@@ -51,4 +51,4 @@ std::unique_ptr<Recommendation> recommend(const std::vector<DriftResult>& result
   return best;
 }
 
-}  // namespace decant
+}  // namespace decant::drift

@@ -9,7 +9,7 @@
 
 #include <cmath>
 
-namespace decant {
+namespace decant::drift {
 namespace {
 
 std::string number(double value, const char* format = "{:.1e}") {
@@ -67,8 +67,8 @@ void list_columns(Columns<Row>& c) {
   c.whole("derived", [](const Row& r) { return r.list.derived; }, "1: the skin that theory asks for");
 }
 
-void write_rows(Hdf5Writer& out, const std::vector<DriftRow>& rows) {
-  using R = DriftRow;
+void write_rows(Hdf5Writer& out, const std::vector<Row>& rows) {
+  using R = Row;
   Columns<R> c(out, "/rows", rows);
   list_columns(c);
   c.whole(
@@ -114,7 +114,7 @@ struct Placed {
   std::string fixture;
   double time;
   ListChoice list;
-  const DriftSample* sample;
+  const Sample* sample;
 };
 
 void write_samples(Hdf5Writer& out, const std::string& group, const std::vector<Placed>& samples) {
@@ -179,15 +179,15 @@ std::string name_of(const ListChoice& list) {
 
 }  // namespace
 
-std::string drift_table(const std::vector<DriftResult>& results) {
+std::string table(const std::vector<Result>& results) {
   std::string text;
-  for (const DriftResult& result : results) {
+  for (const Result& result : results) {
     text += fmt::format(
         "{}: {} particles, measured in {:.1f} s\n"
         "  {:>5} {:>5} {:>8} {:>8} {:>8} {:>8} {:>8} {:>6} {:>6} {:>8} {:>8} {:>8} {:>8} {:>9} {:>8}\n",
         result.fixture, result.particles, result.measured_seconds, "every", "skin", "missed", "own", "worst",
         "expected", "wall's", "first", "proved", "density", "accel.", "expected", "wall's", "deviation", "us");
-    for (const DriftRow& row : result.rows) {
+    for (const Row& row : result.rows) {
       const bool measured = row.list.interval != 0;
       const auto miss = [&](double share) { return measured ? percent(share) : "-"; };
       const auto error = [&](double e) { return measured ? number(e) : "-"; };
@@ -207,7 +207,7 @@ std::string drift_table(const std::vector<DriftResult>& results) {
   }
   text += fmt::format("\n{:<28} {:>5} {:>9} {:>9} {:>9} {:>9}   powers of the relative motion\n", "safe interval",
                       "skin", "measured", "proved", "by speeds", "by pairs");
-  for (const DriftResult& result : results)
+  for (const Result& result : results)
     for (const SafeInterval& safe : result.safe) {
       std::string powers;
       for (std::size_t k = 0; safe.skin == 0 && k < 3; ++k)
@@ -220,9 +220,9 @@ std::string drift_table(const std::vector<DriftResult>& results) {
   return text;
 }
 
-std::string pour_table(const std::vector<PourDrift>& pours) {
+std::string pour_table(const std::vector<PourResult>& pours) {
   std::string text;
-  for (const PourDrift& pour : pours) {
+  for (const PourResult& pour : pours) {
     if (pour.whole.empty()) continue;
     text += fmt::format(
         "\n{}, the whole pour\n  {:>9} {:>5} {:>10} {:>8} {:>8} {:>8} {:>7} "
@@ -245,8 +245,8 @@ std::string pour_table(const std::vector<PourDrift>& pours) {
   return text;
 }
 
-void write_drift(const std::filesystem::path& file, const std::vector<DriftResult>& results,
-                 const std::vector<PourDrift>& pours, const BackendInfo& backend, const std::string& interrupted) {
+void write(const std::filesystem::path& file, const std::vector<Result>& results, const std::vector<PourResult>& pours,
+           const BackendInfo& backend, const std::string& interrupted) {
   Hdf5Writer out(file);
   out.attribute("/", "decant_drift", 1);
   out.attribute("/", "backend", backend.name);
@@ -254,16 +254,16 @@ void write_drift(const std::filesystem::path& file, const std::vector<DriftResul
   out.attribute("/", "device", backend.device);
   for (const auto& [key, value] : build_provenance()) out.attribute("/provenance", key, value);
   if (!interrupted.empty()) out.attribute("/provenance", "interrupted", interrupted);
-  std::vector<DriftRow> rows;
+  std::vector<Row> rows;
   std::vector<Placed> samples, moments;
   std::vector<SafeInterval> safe;
   std::vector<WholePour> whole;
-  for (const DriftResult& result : results) {
+  for (const Result& result : results) {
     rows.insert(rows.end(), result.rows.begin(), result.rows.end());
     safe.insert(safe.end(), result.safe.begin(), result.safe.end());
-    for (const DriftSample& s : result.samples) samples.push_back({result.fixture, not_measured, s.list, &s});
+    for (const Sample& s : result.samples) samples.push_back({result.fixture, not_measured, s.list, &s});
   }
-  for (const PourDrift& pour : pours) {
+  for (const PourResult& pour : pours) {
     whole.insert(whole.end(), pour.whole.begin(), pour.whole.end());
     for (const PourMoment& moment : pour.moments)
       moments.push_back({pour.fixture, moment.time, moment.sample.list, &moment.sample});
@@ -284,7 +284,7 @@ void write_drift(const std::filesystem::path& file, const std::vector<DriftResul
         "expected_relative", [](const S& s) { return s.expected_relative; },
         "by how fast the first state's pairs near H approach");
   }
-  using R = DriftResult;
+  using R = Result;
   Columns<R> c(out, "/fixtures", results);
   c.text("name", [](const R& r) { return r.fixture; });
   c.whole("particles", [](const R& r) { return r.particles; });
@@ -302,4 +302,4 @@ void write_drift(const std::filesystem::path& file, const std::vector<DriftResul
   out.commit();
 }
 
-}  // namespace decant
+}  // namespace decant::drift

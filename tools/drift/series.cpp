@@ -11,7 +11,7 @@
 #include <chrono>
 #include <map>
 
-namespace decant {
+namespace decant::drift {
 namespace {
 
 /// One kind of neighbors, ascending.
@@ -60,7 +60,7 @@ void require_both_directions(const Hdf5Reader& in, const std::string& path,
 
 }  // namespace
 
-DriftResult measure_series(const Fixture& fixture, const std::filesystem::path& series) {
+Result measure_series(const Fixture& fixture, const std::filesystem::path& series) {
   const auto start = std::chrono::steady_clock::now();
   const Hdf5Reader in(series);
   if (!in.has_attribute("/", "decant_list_series"))
@@ -91,7 +91,7 @@ DriftResult measure_series(const Fixture& fixture, const std::filesystem::path& 
     instants[state.substep] = instant_of(scene, walls, volumes, state);
   }
   std::map<std::int64_t, StaleList> lists;
-  std::vector<DriftSample> samples;
+  std::vector<Sample> samples;
   for (std::size_t k = 0; k < substeps.size(); ++k) {
     const std::string group = fmt::format("/list/{}", used[k]);
     auto list = lists.find(used[k]);
@@ -111,7 +111,7 @@ DriftResult measure_series(const Fixture& fixture, const std::filesystem::path& 
       in.fail(fmt::format("/state/{}/list", k), fmt::format("{}", used[k]), "a list built at or before the state");
     samples.push_back({{-1, not_measured, false}, substeps[k], stale, false});
   }
-  DriftResult result;
+  Result result;
   result.fixture = fixture.name;
   result.particle_spacing = scene.particle_spacing;
   result.support_radius = scene.support_radius();
@@ -125,4 +125,4 @@ DriftResult measure_series(const Fixture& fixture, const std::filesystem::path& 
   return result;
 }
 
-}  // namespace decant
+}  // namespace decant::drift

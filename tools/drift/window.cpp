@@ -14,7 +14,7 @@
 #include <map>
 #include <mutex>
 
-namespace decant {
+namespace decant::drift {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -39,7 +39,7 @@ struct Build {
   std::vector<Staleness> ages;
 };
 
-std::vector<Build> builds_of(const DriftPlan& plan) {
+std::vector<Build> builds_of(const Plan& plan) {
   std::map<std::pair<double, int>, int> last;  // skin and build; descending age is dearest first
   for (const ListChoice& list : plan.lists)
     for (int built = 0; built < plan.window; built += list.interval) {
@@ -77,7 +77,7 @@ double relative_motion(const Scene& scene, const Instant& built, const Instant& 
   return pairs > 0 ? std::sqrt(squares / pairs) / scene.support_radius() : 0;
 }
 
-void fit_powers(const Scene& scene, const std::vector<Instant>& window, DriftResult& result) {
+void fit_powers(const Scene& scene, const std::vector<Instant>& window, Result& result) {
   int longest = 0;
   for (const auto& s : result.samples)
     if (s.list.skin == 0) longest = std::max(longest, s.list.interval);
@@ -96,7 +96,7 @@ void fit_powers(const Scene& scene, const std::vector<Instant>& window, DriftRes
 
 /// Earliest age at which a list of that skin misses or may miss a pair; the window where none does. Skins
 /// that theory chose for one interval were not looked at for longer.
-std::vector<SafeInterval> safe_intervals(const Scene& scene, const PairsNearEdge& near, const DriftPlan& plan,
+std::vector<SafeInterval> safe_intervals(const Scene& scene, const PairsNearEdge& near, const Plan& plan,
                                          const std::vector<Build>& builds, const std::string& fixture) {
   std::map<double, SafeInterval> by_skin;
   for (const Build& build : builds) {
@@ -122,17 +122,17 @@ std::vector<SafeInterval> safe_intervals(const Scene& scene, const PairsNearEdge
 
 }  // namespace
 
-DriftRow summed_up(const std::string& fixture, const std::vector<DriftSample>& samples) {
-  DriftRow row;
+Row summed_up(const std::string& fixture, const std::vector<Sample>& samples) {
+  Row row;
   row.fixture = fixture;
   row.list = samples.front().list;
   row.first_miss = row.list.interval;
   if (row.list.interval < 1)
-    for (const DriftSample& sample : samples)
+    for (const Sample& sample : samples)
       row.first_miss = std::max(row.first_miss, static_cast<int>(sample.stale.age) + 1);
   row.proved_until = row.first_miss;
   const auto n = static_cast<double>(samples.size());
-  for (const DriftSample& sample : samples) {
+  for (const Sample& sample : samples) {
     const Staleness& s = sample.stale;
     const std::int64_t missed = s.fluid.missed + s.wall.missed, within = s.fluid.within + s.wall.within,
                        listed = s.fluid.listed + s.wall.listed;
@@ -187,13 +187,13 @@ std::vector<ListChoice> derived_lists(const std::vector<Fixture>& fixtures, cons
   return lists;
 }
 
-DriftResult measure_drift(const Fixture& fixture, const DriftPlan& plan, const ListMaker& make_list,
-                          const std::function<void(double)>& progress) {
+Result measure(const Fixture& fixture, const Plan& plan, const ListMaker& make_list,
+               const std::function<void(double)>& progress) {
   const auto start = Clock::now();
   const Scene& scene = fixture.scene;
   const Walls walls = sample_walls(scene);
   const WallSolution volumes = wall_solution(scene, walls);
-  DriftResult result;
+  Result result;
   result.fixture = fixture.name;
   result.particle_spacing = scene.particle_spacing;
   result.support_radius = scene.support_radius();
@@ -224,7 +224,7 @@ DriftResult measure_drift(const Fixture& fixture, const DriftPlan& plan, const L
 
   const PairsNearEdge near = pairs_near_edge(scene, volumes.volume, window.front());
   for (const ListChoice& list : plan.lists) {
-    std::vector<DriftSample> samples;
+    std::vector<Sample> samples;
     for (int k = 0; k < plan.window; ++k) {
       const int built = k - k % list.interval;
       const auto build = std::find_if(builds.begin(), builds.end(),
@@ -243,4 +243,4 @@ DriftResult measure_drift(const Fixture& fixture, const DriftPlan& plan, const L
   return result;
 }
 
-}  // namespace decant
+}  // namespace decant::drift

@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-namespace decant {
+namespace decant::frames {
 namespace {
 
 // Measured on poured frames; only the disk estimate depends on them.
@@ -48,7 +48,7 @@ void put(FileAside& out, const Chunks& chunks) {
 
 }  // namespace
 
-CsvWriter::CsvWriter(std::filesystem::path folder, const Scene& scene, const FrameLayout& layout)
+CsvWriter::CsvWriter(std::filesystem::path folder, const Scene& scene, const Layout& layout)
     : folder_(std::move(folder)) {
   std::filesystem::create_directories(folder_);
   FileAside out(folder_ / "boundary_static.csv");
@@ -80,11 +80,11 @@ void CsvWriter::write(const Frame& frame) const {
   walls.commit();
 }
 
-std::int64_t csv_bytes(const FrameLayout& layout) {
+std::int64_t csv_bytes(const Layout& layout) {
   std::int64_t bytes = layout.frames * layout.particles * bytes_per_particle;
   for (const RenderWall& wall : layout.walls)
     bytes += (wall.moving ? layout.frames : 1) * wall.surface.vertex.cols() * bytes_per_vertex;
   return bytes;
 }
 
-}  // namespace decant
+}  // namespace decant::frames

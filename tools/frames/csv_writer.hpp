@@ -7,7 +7,7 @@
 
 #include <filesystem>
 
-namespace decant {
+namespace decant::frames {
 
 /// Writes DIR/fluid_000123.csv (id,x,y,z,vx,vy,vz,density,pressure; m, m/s, kg/m³, Pa),
 /// DIR/boundary_000123.csv (id,x,y,z of the moving walls' render boundary) and once
@@ -17,7 +17,7 @@ class CsvWriter {
  public:
   /// Makes the folder and writes the walls that stand still. Throws std::runtime_error naming the
   /// file where writing fails.
-  CsvWriter(std::filesystem::path folder, const Scene& scene, const FrameLayout& layout);
+  CsvWriter(std::filesystem::path folder, const Scene& scene, const Layout& layout);
   /// Throws std::runtime_error naming the file where writing fails.
   void write(const Frame& frame) const;
 
@@ -27,6 +27,6 @@ class CsvWriter {
 };
 
 /// Bytes to expect of a layout's CSV files.
-std::int64_t csv_bytes(const FrameLayout& layout);
+std::int64_t csv_bytes(const Layout& layout);
 
-}  // namespace decant
+}  // namespace decant::frames

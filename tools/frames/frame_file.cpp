@@ -20,7 +20,7 @@
 #include <stdexcept>
 #include <system_error>
 
-namespace decant {
+namespace decant::frames {
 
 // Values go to the file as they lie in memory.
 static_assert(std::endian::native == std::endian::little);
@@ -43,7 +43,7 @@ struct DatasetPlan {
 std::string vertex_path(const RenderWall& wall) { return "/walls/" + wall.name + "/vertex"; }
 std::string triangle_path(const RenderWall& wall) { return "/walls/" + wall.name + "/triangle"; }
 
-std::vector<DatasetPlan> plan(const FrameLayout& layout) {
+std::vector<DatasetPlan> plan(const Layout& layout) {
   const hsize_t t = static_cast<hsize_t>(layout.frames);
   const hsize_t n = static_cast<hsize_t>(layout.particles);
   const hid_t f32 = H5T_IEEE_F32LE, f64 = H5T_IEEE_F64LE, u8 = H5T_STD_U8LE, i32 = H5T_STD_I32LE;
@@ -152,8 +152,8 @@ std::size_t byte_count(const std::vector<T>& values) {
 
 }  // namespace
 
-FrameLayout frame_layout(const Scene& scene, std::int64_t particles) {
-  FrameLayout layout;
+Layout layout_of(const Scene& scene, std::int64_t particles) {
+  Layout layout;
   layout.particles = particles;
   layout.frames = scene.schedule.frames + 1;
   for (const Container& container : scene.containers)
@@ -169,19 +169,19 @@ std::vector<float> posed_vertices(const Container& container, const RenderSurfac
   return world;
 }
 
-std::int64_t frame_file_bytes(const FrameLayout& layout) {
+std::int64_t file_bytes(const Layout& layout) {
   std::uint64_t bytes = 0;
   for (const DatasetPlan& d : plan(layout)) bytes += d.bytes();
   return static_cast<std::int64_t>(bytes);
 }
 
-FrameFile::FrameFile(std::filesystem::path file, const FrameLayout& layout)
+File::File(std::filesystem::path file, const Layout& layout)
     : file_(std::move(file)), particles_(layout.particles), frames_(layout.frames) {
   for (const RenderWall& wall : layout.walls)
     if (wall.moving) moving_.push_back(vertex_path(wall));
 }
 
-FrameFile::FrameFile(FrameFile&& other) noexcept
+File::File(File&& other) noexcept
     : file_(std::move(other.file_)),
       descriptor_(std::exchange(other.descriptor_, -1)),
       particles_(other.particles_),
@@ -189,13 +189,13 @@ FrameFile::FrameFile(FrameFile&& other) noexcept
       offset_(std::move(other.offset_)),
       moving_(std::move(other.moving_)) {}
 
-FrameFile::~FrameFile() {
+File::~File() {
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
-FrameFile FrameFile::create(const std::filesystem::path& file, const Scene& scene, const FrameLayout& layout,
-                            const std::map<std::string, std::string>& texts) {
-  FrameFile out(file, layout);
+File File::create(const std::filesystem::path& file, const Scene& scene, const Layout& layout,
+                  const std::map<std::string, std::string>& texts) {
+  File out(file, layout);
   // Before HDF5 empties it.
   out.descriptor_ = open_exclusively(file);
   try {
@@ -229,8 +229,8 @@ FrameFile FrameFile::create(const std::filesystem::path& file, const Scene& scen
   return out;
 }
 
-FrameFile FrameFile::reopen(const std::filesystem::path& file, const FrameLayout& layout) {
-  FrameFile out(file, layout);
+File File::reopen(const std::filesystem::path& file, const Layout& layout) {
+  File out(file, layout);
   {
     const Handle access = without_locks();
     const Handle id(H5Fopen(file.c_str(), H5F_ACC_RDONLY, access.get()));
@@ -241,7 +241,7 @@ FrameFile FrameFile::reopen(const std::filesystem::path& file, const FrameLayout
   return out;
 }
 
-void FrameFile::put(std::uint64_t dataset_offset, const void* data, std::size_t bytes, std::int64_t row) {
+void File::put(std::uint64_t dataset_offset, const void* data, std::size_t bytes, std::int64_t row) {
   auto* from = static_cast<const char*>(data);
   auto at = static_cast<off_t>(dataset_offset + static_cast<std::uint64_t>(row) * bytes);
   while (bytes > 0) {
@@ -255,7 +255,7 @@ void FrameFile::put(std::uint64_t dataset_offset, const void* data, std::size_t 
 }
 
 template <class T>
-void FrameFile::put_row(const std::string& path, const std::vector<T>& values, std::int64_t row) {
+void File::put_row(const std::string& path, const std::vector<T>& values, std::int64_t row) {
   const std::uint64_t offset = offset_.at(path);
   put(offset, values.data(), byte_count(values), row);
   // The kernel would begin to write once much has gathered, and the end of the pour would wait for that. Where it
@@ -265,17 +265,17 @@ void FrameFile::put_row(const std::string& path, const std::vector<T>& values, s
                           static_cast<off_t>(byte_count(values)), SYNC_FILE_RANGE_WRITE);
 }
 
-void FrameFile::require(bool fits, const Frame& frame) const {
+void File::require(bool fits, const Frame& frame) const {
   if (!fits || frame.index < 0 || frame.index >= frames_)
     fail(file_, fmt::format("frame {} does not fit its layout", frame.index));
 }
 
-void FrameFile::write(const Frame& frame) {
+void File::write(const Frame& frame) {
   write_values(frame);
   complete(frame);
 }
 
-void FrameFile::write_values(const Frame& frame) {
+void File::write_values(const Frame& frame) {
   const auto n = static_cast<std::size_t>(particles_);
   require(frame.position.size() == 3 * n && frame.velocity.size() == 3 * n && frame.density.size() == n &&
               frame.pressure.size() == n && frame.wall.size() == moving_.size(),
@@ -287,14 +287,14 @@ void FrameFile::write_values(const Frame& frame) {
   for (std::size_t w = 0; w < moving_.size(); ++w) put_row(moving_[w], frame.wall[w], frame.index);
 }
 
-void FrameFile::complete(const Frame& frame) {
+void File::complete(const Frame& frame) {
   require(frame.place.size() == static_cast<std::size_t>(particles_), frame);
   put_row("/fluid/place", frame.place, frame.index);
   put(offset_.at("/time"), &frame.time, sizeof frame.time, frame.index);
 }
 
-void FrameFile::sync() {
+void File::sync() {
   if (::fdatasync(descriptor_) != 0) fail_errno(file_, "cannot be synchronised");
 }
 
-}  // namespace decant
+}  // namespace decant::frames

@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-namespace decant {
+namespace decant::frames {
 
 /// A container's render boundary, and whether its vertices differ from frame to frame.
 struct RenderWall {
@@ -24,14 +24,14 @@ struct RenderWall {
 };
 
 /// What a frame file holds: sizes fixed before the first frame.
-struct FrameLayout {
+struct Layout {
   std::int64_t particles = 0;
   std::int64_t frames = 0;  // the initial one included
   std::vector<RenderWall> walls;
 };
 
 /// Layout of the scene's frames, render boundaries with vertices about dx apart.
-FrameLayout frame_layout(const Scene& scene, std::int64_t particles);
+Layout layout_of(const Scene& scene, std::int64_t particles);
 
 /// One frame as it is written; positions and velocities by particle, x y z.
 struct Frame {
@@ -47,22 +47,22 @@ struct Frame {
 std::vector<float> posed_vertices(const Container& container, const RenderSurface& surface, double time);
 
 /// Bytes that the frame file of a layout takes, the datasets alone.
-std::int64_t frame_file_bytes(const FrameLayout& layout);
+std::int64_t file_bytes(const Layout& layout);
 
 /// The open frame file. Not thread-safe; any one thread may write.
-class FrameFile {
+class File {
  public:
   /// Creates the file with all datasets, reserves its room on the disk, marks all frames unwritten
   /// (time NaN) and writes the walls that stand still. `texts` become attributes of the root.
   /// Throws std::runtime_error naming the file.
-  static FrameFile create(const std::filesystem::path& file, const Scene& scene, const FrameLayout& layout,
-                          const std::map<std::string, std::string>& texts);
+  static File create(const std::filesystem::path& file, const Scene& scene, const Layout& layout,
+                     const std::map<std::string, std::string>& texts);
   /// Opens a file left unfinished. Throws InputError where its datasets do not fit the layout.
-  static FrameFile reopen(const std::filesystem::path& file, const FrameLayout& layout);
+  static File reopen(const std::filesystem::path& file, const Layout& layout);
 
-  FrameFile(FrameFile&& other) noexcept;
-  FrameFile& operator=(FrameFile&&) = delete;
-  ~FrameFile();
+  File(File&& other) noexcept;
+  File& operator=(File&&) = delete;
+  ~File();
 
   /// Writes one frame, its time last. Throws std::runtime_error where the disk refuses.
   void write(const Frame& frame);
@@ -74,7 +74,7 @@ class FrameFile {
   void sync();
 
  private:
-  FrameFile(std::filesystem::path file, const FrameLayout& layout);
+  File(std::filesystem::path file, const Layout& layout);
   void put(std::uint64_t dataset_offset, const void* data, std::size_t bytes, std::int64_t row);
   template <class T>
   void put_row(const std::string& path, const std::vector<T>& values, std::int64_t row);
@@ -87,4 +87,4 @@ class FrameFile {
   std::vector<std::string> moving_;              // dataset paths of the moving walls
 };
 
-}  // namespace decant
+}  // namespace decant::frames

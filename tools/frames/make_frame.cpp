@@ -5,7 +5,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 
-namespace decant {
+namespace decant::frames {
 namespace {
 
 template <class Values>
@@ -18,7 +18,7 @@ std::vector<float> rounded(const Values& values) {
 
 }  // namespace
 
-Frame make_frame(const Scene& scene, const FrameLayout& layout, std::int64_t index, const ParticleState& state,
+Frame make_frame(const Scene& scene, const Layout& layout, std::int64_t index, const ParticleState& state,
                  const Fields& fields) {
   Frame frame;
   frame.index = index;
@@ -42,4 +42,4 @@ Frame make_frame(const Scene& scene, const FrameLayout& layout, std::int64_t ind
   return frame;
 }
 
-}  // namespace decant
+}  // namespace decant::frames

@@ -16,7 +16,7 @@
 #include <stdexcept>
 #include <utility>
 
-namespace decant {
+namespace decant::frames {
 namespace {
 
 using Shape = std::vector<hsize_t>;
@@ -29,7 +29,7 @@ IdVector one(std::int64_t value) { return IdVector::Constant(1, value); }
 /// A VTKHDF file in the making, and the frame file that it shows.
 class VtkHdf {
  public:
-  VtkHdf(const std::filesystem::path& file, const FrameLayout& layout, const std::vector<double>& times,
+  VtkHdf(const std::filesystem::path& file, const Layout& layout, const std::vector<double>& times,
          std::string data_file)
       : out_(file),
         file_(file),
@@ -122,8 +122,8 @@ void write_wall(VtkHdf& file, const std::string& group, const RenderWall& wall) 
 
 }  // namespace
 
-void write_frames_vtkhdf(const std::filesystem::path& file, const FrameLayout& layout, const std::vector<double>& times,
-                         const std::string& data_file) {
+void write_fluid_vtkhdf(const std::filesystem::path& file, const Layout& layout, const std::vector<double>& times,
+                        const std::string& data_file) {
   struct Array {
     const char* name;
     hid_t type;
@@ -157,7 +157,7 @@ void write_frames_vtkhdf(const std::filesystem::path& file, const FrameLayout& l
   vtk.out().commit();
 }
 
-void write_walls_vtkhdf(const std::filesystem::path& file, const FrameLayout& layout, const std::vector<double>& times,
+void write_walls_vtkhdf(const std::filesystem::path& file, const Layout& layout, const std::vector<double>& times,
                         const std::string& data_file) {
   VtkHdf vtk(file, layout, times, data_file);
   vtk.ordered_group(root);
@@ -174,4 +174,4 @@ void write_walls_vtkhdf(const std::filesystem::path& file, const FrameLayout& la
   vtk.out().commit();
 }
 
-}  // namespace decant
+}  // namespace decant::frames

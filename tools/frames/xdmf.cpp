@@ -10,7 +10,7 @@
 #include <string_view>
 #include <utility>
 
-namespace decant {
+namespace decant::frames {
 namespace {
 
 struct Numbers {
@@ -68,7 +68,7 @@ std::string text_of(const pugi::xml_document& document) {
 
 }  // namespace
 
-std::string frames_xdmf(const FrameLayout& layout, const std::vector<double>& times, const std::string& data_file) {
+std::string fluid_xdmf(const Layout& layout, const std::vector<double>& times, const std::string& data_file) {
   const std::int64_t n = layout.particles;
   pugi::xml_document document;
   const pugi::xml_node all = temporal(document, "fluid");
@@ -93,7 +93,7 @@ std::string frames_xdmf(const FrameLayout& layout, const std::vector<double>& ti
   return text_of(document);
 }
 
-std::string walls_xdmf(const FrameLayout& layout, const std::vector<double>& times, const std::string& data_file) {
+std::string walls_xdmf(const Layout& layout, const std::vector<double>& times, const std::string& data_file) {
   pugi::xml_document document;
   const pugi::xml_node all = temporal(document, "walls");
   for (std::size_t t = 0; t < times.size(); ++t) {
@@ -115,4 +115,4 @@ std::string walls_xdmf(const FrameLayout& layout, const std::vector<double>& tim
   return text_of(document);
 }
 
-}  // namespace decant
+}  // namespace decant::frames

@@ -13,7 +13,7 @@
 
 #include <algorithm>
 
-namespace decant {
+namespace decant::pour {
 namespace {
 
 /// "time.frames" of "/time/frames".
@@ -108,7 +108,7 @@ Checkpoint read_checkpoint(const std::filesystem::path& file) {
 }
 
 void check_same_pour(const std::filesystem::path& file, const Checkpoint& checkpoint, const Scene& scene,
-                     const BackendInfo& backend, const PourChoices& choices) {
+                     const BackendInfo& backend, const Choices& choices) {
   const auto refuse = [&](const std::string& key, const std::string& now, const std::string& then) {
     throw InputError(file.string(), key, now, "the pour to resume was started with " + then);
   };
@@ -127,10 +127,10 @@ void check_same_pour(const std::filesystem::path& file, const Checkpoint& checkp
   if (backend.options != then.options)
     refuse("backend options", "\"" + backend.options + "\"", "\"" + then.options + "\"");
   if (backend.executor != then.executor) refuse("--executor", backend.executor, then.executor);
-  const PourChoices& chosen = checkpoint.choices;
+  const Choices& chosen = checkpoint.choices;
   if (choices.csv != chosen.csv) refuse("--csv", choices.csv ? "yes" : "no", chosen.csv ? "yes" : "no");
   if (choices.perturbation != chosen.perturbation)
     refuse("--perturb", std::to_string(choices.perturbation), std::to_string(chosen.perturbation));
 }
 
-}  // namespace decant
+}  // namespace decant::pour

@@ -15,7 +15,7 @@
 #include <optional>
 #include <string>
 
-namespace decant {
+namespace decant::pour {
 
 /// The file's schema; a reader refuses any other.
 inline constexpr std::int64_t checkpoint_schema = 2;
@@ -30,7 +30,7 @@ struct PartOfFrame {
 };
 
 /// What changes a pour beside scene and backend.
-struct PourChoices {
+struct Choices {
   bool csv = false;
   std::uint32_t perturbation = 0;  // seed; 0: none
 };
@@ -40,7 +40,7 @@ struct Checkpoint {
   ParticleState state;              // full precision, of this frame or within the next
   Timeline timeline;                // rows 0 … frame
   std::optional<PartOfFrame> part;  // where the state is within the next frame
-  PourChoices choices;
+  Choices choices;
   double wall_seconds = 0;  // s, since the start, all sessions together
   std::string scene_json;   // canonical
   BackendInfo backend;
@@ -55,6 +55,6 @@ Checkpoint read_checkpoint(const std::filesystem::path& file);
 /// Refuses to continue what is not the same pour. Throws InputError naming file, the first key that
 /// differs, its value now and the value then. The device may differ; the caller says so.
 void check_same_pour(const std::filesystem::path& file, const Checkpoint& checkpoint, const Scene& scene,
-                     const BackendInfo& backend, const PourChoices& choices);
+                     const BackendInfo& backend, const Choices& choices);
 
-}  // namespace decant
+}  // namespace decant::pour

@@ -10,7 +10,7 @@
 
 #include <fmt/format.h>
 
-namespace decant {
+namespace decant::pour {
 namespace {
 
 // Particles; a larger state is dumped with a sample of the oracle's fields.
@@ -44,4 +44,4 @@ std::string save_failed_state(const std::filesystem::path& file, const Scene& sc
   }
 }
 
-}  // namespace decant
+}  // namespace decant::pour

@@ -12,7 +12,7 @@
 #include <stdexcept>
 #include <system_error>
 
-namespace decant {
+namespace decant::pour {
 
 FolderLock::FolderLock(const char* option, const std::filesystem::path& folder)
     : descriptor_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
@@ -28,4 +28,4 @@ FolderLock::~FolderLock() {
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
-}  // namespace decant
+}  // namespace decant::pour

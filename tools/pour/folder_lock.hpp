@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-namespace decant {
+namespace decant::pour {
 
 /// Keeps other processes out of a folder as long as this lives; a process that ends, however it ends, lets
 /// go. Nothing is left in the folder. Where the file system has no such locks (some network ones) it keeps
@@ -22,4 +22,4 @@ class FolderLock {
   int descriptor_ = -1;
 };
 
-}  // namespace decant
+}  // namespace decant::pour

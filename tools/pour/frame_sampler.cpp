@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace decant {
+namespace decant::pour {
 namespace {
 
 /// What a look at walls found, joined to what another one found.
@@ -32,7 +32,7 @@ std::int64_t fastest_in(const ParticleState& state) {
 
 }  // namespace
 
-FrameSampler::FrameSampler(const Scene& scene, const FrameLayout& layout, Outputs outputs)
+FrameSampler::FrameSampler(const Scene& scene, const frames::Layout& layout, Outputs outputs)
     : scene_(scene), layout_(layout), outputs_(std::move(outputs)), audit_(scene) {}
 
 void FrameSampler::resume(const SharedState& state, std::vector<TimelineRow> rows,
@@ -71,13 +71,13 @@ AuditResult FrameSampler::sample(const SharedState& state) {
 }
 
 void FrameSampler::write(const SharedState& state, const Fields& fields, const FrameTimes& times) {
-  Frame frame;
+  frames::Frame frame;
   AuditResult audit;
   TimelineRow row;
   Fields next;
   tbb::parallel_invoke(
       [&] {
-        frame = make_frame(scene_, layout_, times.frame, *state, fields);
+        frame = frames::make_frame(scene_, layout_, times.frame, *state, fields);
         outputs_.write_values(frame);
       },
       [&] {
@@ -118,4 +118,4 @@ Fields FrameSampler::unwritten(Eigen::Index fluid, Eigen::Index wall) {
   return fields;
 }
 
-}  // namespace decant
+}  // namespace decant::pour

@@ -17,7 +17,7 @@
 #include <optional>
 #include <vector>
 
-namespace decant {
+namespace decant::pour {
 
 /// Held by the solver's loop and by whoever still looks at it.
 using SharedState = std::shared_ptr<const ParticleState>;
@@ -35,12 +35,12 @@ class FrameSampler {
  public:
   /// What becomes of a frame's data. What they throw, later calls of the sampler throw.
   struct Outputs {
-    std::function<void(const Frame&)> write_values;  // before its places are known
-    std::function<void(const Frame&)> complete;
+    std::function<void(const frames::Frame&)> write_values;  // before its places are known
+    std::function<void(const frames::Frame&)> complete;
     std::function<void(const TimelineRow&)> tell;  // of a frame that is complete
   };
 
-  FrameSampler(const Scene& scene, const FrameLayout& layout, Outputs outputs);
+  FrameSampler(const Scene& scene, const frames::Layout& layout, Outputs outputs);
 
   /// Goes on from a checkpoint.
   void resume(const SharedState& state, std::vector<TimelineRow> rows, const std::optional<PartOfFrame>& part);
@@ -65,7 +65,7 @@ class FrameSampler {
   void write(const SharedState& state, const Fields& fields, const FrameTimes& times);
 
   const Scene& scene_;
-  const FrameLayout& layout_;
+  const frames::Layout& layout_;
   const Outputs outputs_;
   Audit audit_;
   SharedState last_;  // sampled
@@ -77,4 +77,4 @@ class FrameSampler {
   WorkThread thread_;                // last: it uses all of the above
 };
 
-}  // namespace decant
+}  // namespace decant::pour

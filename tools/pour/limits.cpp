@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-namespace decant {
+namespace decant::pour {
 
 std::vector<LimitExceeded> limits_exceeded(const std::vector<TimelineRow>& rows, const SceneLimits& limits) {
   const auto beyond = [&](const char* name, const char* unit, double bound, auto value, auto particle) {
@@ -43,4 +43,4 @@ std::string describe(const LimitExceeded& e) {
   return what + fmt::format("denser than the {:.4g} kg/m³ that the speed of sound allows for", e.bound);
 }
 
-}  // namespace decant
+}  // namespace decant::pour

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace decant {
+namespace decant::pour {
 
 /// One limit that was passed.
 struct LimitExceeded {
@@ -28,4 +28,4 @@ std::vector<LimitExceeded> limits_exceeded(const std::vector<TimelineRow>& rows,
 /// "frame 3: particle 17 at 10.7 m/s, faster than the 2.4 m/s that the time step was derived for".
 std::string describe(const LimitExceeded& exceeded);
 
-}  // namespace decant
+}  // namespace decant::pour

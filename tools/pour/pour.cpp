@@ -33,7 +33,7 @@
 #include <optional>
 #include <utility>
 
-namespace decant {
+namespace decant::pour {
 namespace fs = std::filesystem;
 namespace {
 
@@ -45,7 +45,7 @@ bool finite(const ParticleState& state) { return all_finite(state.position) && a
 
 class Pour {
  public:
-  Pour(const Scene& scene, Backend& backend, const PourOptions& options)
+  Pour(const Scene& scene, Backend& backend, const Options& options)
       : scene_(scene),
         backend_(backend),
         options_(options),
@@ -56,7 +56,7 @@ class Pour {
     if (options.stop && options.leave) watcher_.emplace(options.stop, [this] { leave(); });
   }
 
-  PourResult run();
+  Result run();
 
  private:
   void lock_folder();
@@ -70,7 +70,7 @@ class Pour {
   void checkpoint();
   void finish();
   Timeline timeline() const { return {samples_->rows(), stages_}; }
-  PourResult result();
+  Result result();
   void leave();
   void check(const Status& status, const ParticleState& good);
   [[noreturn]] void dump(const std::string& trouble, const ParticleState& good);
@@ -93,14 +93,14 @@ class Pour {
 
   const Scene& scene_;
   Backend& backend_;
-  const PourOptions& options_;
-  const PourFiles files_;
+  const Options& options_;
+  const Files files_;
   const Segments segments_;
   const SceneLimits limits_;
   const BackendInfo info_;
   std::optional<FolderLock> lock_;
   Walls walls_;
-  FrameLayout layout_;
+  frames::Layout layout_;
   SharedState state_;
   std::int64_t frame_ = 0;     // the last one that was reached
   double solver_seconds_ = 0;  // s, since then
@@ -112,15 +112,15 @@ class Pour {
   bool begun_ = false;             // a checkpoint of this state can be written
   std::vector<std::string> told_;  // limits that were passed
   std::optional<Progress> progress_;
-  std::optional<FrameFile> file_;
-  std::optional<CsvWriter> csv_;
+  std::optional<frames::File> file_;
+  std::optional<frames::CsvWriter> csv_;
   std::optional<FrameSampler> samples_;  // its thread uses the four above
   std::optional<StopWatcher> watcher_;   // last: its thread uses all of them
 };
 
-PourResult Pour::run() {
+Result Pour::run() {
   if (fs::is_directory(options_.out)) lock_folder();
-  check_pour_folder(options_, files_);
+  check_folder(options_, files_);
   walls_ = call([&] { return sample_walls(scene_); });
   if (options_.resume) resume();
   else start();
@@ -138,8 +138,8 @@ PourResult Pour::run() {
   return result();
 }
 
-PourResult Pour::result() {
-  PourResult r;
+Result Pour::result() {
+  Result r;
   r.finished = frame_ == scene_.schedule.frames;
   r.frame = frame_;
   r.substep = state_->substep;
@@ -153,7 +153,7 @@ PourResult Pour::result() {
 
 /// By the watching thread, while the pouring one is in a call. The segment under way is lost.
 void Pour::leave() {
-  PourResult last;
+  Result last;
   last.frame = options_.resume ? frame_ : -1;
   last.substep = state_ ? state_->substep : 0;
   try {
@@ -178,11 +178,11 @@ void Pour::start() {
   ParticleState first = call([&] { return initial_state(scene_); });
   if (options_.perturbation != 0) first = perturbed_start(first, options_.perturbation);
   state_ = std::make_shared<const ParticleState>(std::move(first));
-  layout_ = frame_layout(scene_, state_->size());
+  layout_ = frames::layout_of(scene_, state_->size());
   check_room(options_, files_, layout_, 0);
   fs::create_directories(options_.out);
   lock_folder();
-  check_pour_folder(options_, files_);  // another pour may have made and filled it meanwhile
+  check_folder(options_, files_);  // another pour may have made and filled it meanwhile
   call([&] { backend_.load(scene_, walls_, *state_); });
   open_frames(true);
   Fields fields = Fields::unwritten(state_->size(), walls_.size());
@@ -203,7 +203,7 @@ void Pour::resume() {
                      fmt::format("where a segment of frame {} ends", frame_ + 1));
   stages_ = stages_before_ = from.timeline.stages;
   wall_before_ = from.wall_seconds;
-  layout_ = frame_layout(scene_, state_->size());
+  layout_ = frames::layout_of(scene_, state_->size());
   // A pour killed among its last steps has its frames under their final name already.
   if (!fs::exists(files_.partial) && fs::exists(files_.frames)) fs::rename(files_.frames, files_.partial);
   check_room(options_, files_, layout_, frame_ + 1);
@@ -223,25 +223,25 @@ void Pour::resume() {
 
 void Pour::open_frames(bool anew) {
   if (anew) {
-    file_.emplace(FrameFile::create(files_.partial, scene_, layout_,
-                                    {{"scene_sha256", sha256_of_text(scene_to_json(scene_))},
-                                     {"backend", info_.name},
-                                     {"options", info_.options},
-                                     {"executor", info_.executor},
-                                     {"device", info_.device},
-                                     {"precision", info_.precision},
-                                     {"git_revision", build_provenance().at("git_revision")}}));
+    file_.emplace(frames::File::create(files_.partial, scene_, layout_,
+                                       {{"scene_sha256", sha256_of_text(scene_to_json(scene_))},
+                                        {"backend", info_.name},
+                                        {"options", info_.options},
+                                        {"executor", info_.executor},
+                                        {"device", info_.device},
+                                        {"precision", info_.precision},
+                                        {"git_revision", build_provenance().at("git_revision")}}));
   } else {
-    file_.emplace(FrameFile::reopen(files_.partial, layout_));
+    file_.emplace(frames::File::reopen(files_.partial, layout_));
   }
   if (options_.csv) csv_.emplace(files_.csv, scene_, layout_);
   progress_.emplace("frame", scene_.schedule.frames, frame_, options_.quiet);
   samples_.emplace(scene_, layout_,
-                   FrameSampler::Outputs{[this](const Frame& frame) {
+                   FrameSampler::Outputs{[this](const frames::Frame& frame) {
                                            file_->write_values(frame);
                                            if (csv_) csv_->write(frame);
                                          },
-                                         [this](const Frame& frame) { file_->complete(frame); },
+                                         [this](const frames::Frame& frame) { file_->complete(frame); },
                                          [this](const TimelineRow& row) { tell(row); }});
 }
 
@@ -343,10 +343,10 @@ void Pour::finish() {
   for (const TimelineRow& row : samples_->rows()) times.push_back(row.time);
   fs::rename(files_.partial, files_.frames);
   const std::string data_file = files_.frames.filename().string();
-  write_text_file(files_.frames_xdmf, frames_xdmf(layout_, times, data_file));
-  write_text_file(files_.walls_xdmf, walls_xdmf(layout_, times, data_file));
-  write_frames_vtkhdf(files_.frames_vtkhdf, layout_, times, data_file);
-  write_walls_vtkhdf(files_.walls_vtkhdf, layout_, times, data_file);
+  write_text_file(files_.frames_xdmf, frames::fluid_xdmf(layout_, times, data_file));
+  write_text_file(files_.walls_xdmf, frames::walls_xdmf(layout_, times, data_file));
+  frames::write_fluid_vtkhdf(files_.frames_vtkhdf, layout_, times, data_file);
+  frames::write_walls_vtkhdf(files_.walls_vtkhdf, layout_, times, data_file);
   // Last, because its absence says that all of the above is complete.
   fs::remove(files_.checkpoint);
 }
@@ -363,8 +363,6 @@ void Pour::dump(const std::string& trouble, const ParticleState& good) {
 
 }  // namespace
 
-PourResult pour(const Scene& scene, Backend& backend, const PourOptions& options) {
-  return Pour(scene, backend, options).run();
-}
+Result run(const Scene& scene, Backend& backend, const Options& options) { return Pour(scene, backend, options).run(); }
 
-}  // namespace decant
+}  // namespace decant::pour

@@ -17,11 +17,12 @@
 #include <functional>
 #include <vector>
 
-namespace decant {
+namespace decant::pour {
 
-struct PourResult;
+struct Result;
 
-struct PourOptions {
+/// Where a pour goes, and how it is stopped.
+struct Options {
   std::filesystem::path out;
   bool csv = false, resume = false, quiet = false;
   double checkpoint_seconds = 30;  // s, wall time between checkpoints; 0: as often as can be
@@ -31,11 +32,12 @@ struct PourOptions {
   /// Ends the process where a call of the backend's is still under way half a second after a stop: called
   /// by another thread when the checkpoint is written, with what there is to say. `frame` is −1 where there
   /// is no checkpoint yet.
-  std::function<void(const PourResult&)> leave;
+  std::function<void(const Result&)> leave;
   std::uint32_t perturbation = 0;  // not 0: from perturbed_start with this seed
 };
 
-struct PourResult {
+/// How far a pour came, and what it gave.
+struct Result {
   bool finished = false;      // false: stopped, a checkpoint lies in the folder
   std::int64_t frame = 0;     // the last one written
   std::int64_t substep = 0;   // of the checkpoint, maybe within the next frame
@@ -43,14 +45,14 @@ struct PourResult {
   double wait_seconds = 0;    // s, of this session: waiting until frames were looked at and written
   std::vector<LimitExceeded> limits_exceeded;
   Timeline timeline;
-  PourSummary summary;
+  Summary summary;
 };
 
 /// Pours. Throws InputError where the folder holds another pour or the disk has no room;
 /// BackendError where the backend reports trouble, naming particle and substep, after dumping the
 /// last good state to failed-state.h5 in the folder; std::runtime_error where a file cannot be
 /// written.
-PourResult pour(const Scene& scene, Backend& backend, const PourOptions& options);
+Result run(const Scene& scene, Backend& backend, const Options& options);
 
 /// Every coordinate changed by a random part, up to 2⁻²². Pours that differ in nothing else show how far
 /// apart their ends may be.
@@ -60,4 +62,4 @@ ParticleState perturbed_start(ParticleState state, std::uint32_t seed);
 /// many as keep each of them no longer than it was; derived ones are derived anew.
 Scene with_frames(Scene scene, int frames);
 
-}  // namespace decant
+}  // namespace decant::pour

@@ -19,11 +19,11 @@
 #include <memory>
 #include <set>
 
-namespace decant {
+namespace decant::pour {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr std::size_t elsewhere = 4;  // of pour_fields
+constexpr std::size_t elsewhere = 4;  // of compared_fields
 
 struct FrameValues {
   Eigen::Matrix3Xd position, velocity;
@@ -121,7 +121,7 @@ FieldDistances distances(const Scene& scene, const FrameValues& a, const FrameVa
 
 /// Frames for the table: the first that differs, the first beyond the spread, the last, and some
 /// between.
-std::set<std::size_t> shown_frames(const PourDiff& diff) {
+std::set<std::size_t> shown_frames(const Difference& diff) {
   constexpr std::size_t most = 16;
   std::set<std::size_t> shown;
   const std::int64_t marks[] = {diff.first_difference(), diff.beyond().frame};
@@ -135,34 +135,34 @@ std::set<std::size_t> shown_frames(const PourDiff& diff) {
 
 nlohmann::ordered_json by_field(const FieldDistances& values) {
   nlohmann::ordered_json all;
-  for (std::size_t k = 0; k < values.size(); ++k) all[pour_fields[k]] = values[k];
+  for (std::size_t k = 0; k < values.size(); ++k) all[compared_fields[k]] = values[k];
   return all;
 }
 
 }  // namespace
 
-std::int64_t PourDiff::first_difference() const {
+std::int64_t Difference::first_difference() const {
   for (const auto& f : frames)
     for (const double d : f.distance)
       if (!(d == 0)) return f.frame;
   return -1;
 }
 
-std::vector<std::string> PourDiff::first_fields() const {
+std::vector<std::string> Difference::first_fields() const {
   std::vector<std::string> fields;
   const std::int64_t first = first_difference();
   for (const auto& f : frames)
     if (f.frame == first)
       for (std::size_t k = 0; k < f.distance.size(); ++k)
-        if (!(f.distance[k] == 0)) fields.emplace_back(pour_fields[k]);
+        if (!(f.distance[k] == 0)) fields.emplace_back(compared_fields[k]);
   return fields;
 }
 
-PourDiff::Beyond PourDiff::beyond() const {
+Difference::Beyond Difference::beyond() const {
   FieldDistances widest{};  // so far; a difference that has once arisen may show a frame later
   if (spread_pours > 0) widest[elsewhere] = 1;
   for (const auto& f : frames)
-    for (std::size_t k = 0; k < (spread_pours > 0 ? judged_pour_fields : f.distance.size()); ++k) {
+    for (std::size_t k = 0; k < (spread_pours > 0 ? judged_fields : f.distance.size()); ++k) {
       widest[k] = std::max(widest[k], f.spread[k]);
       if (f.distance[k] <= factor * widest[k]) continue;
       const double times = f.distance[k] / widest[k];
@@ -182,15 +182,15 @@ bool is_pour(const std::filesystem::path& path) {
   }
 }
 
-PourDiff pour_difference(const std::filesystem::path& before, const std::filesystem::path& after,
-                         const std::vector<std::filesystem::path>& spread, double factor) {
+Difference difference(const std::filesystem::path& before, const std::filesystem::path& after,
+                      const std::vector<std::filesystem::path>& spread, double factor) {
   std::vector<std::unique_ptr<Frames>> pours;
   for (const auto* path : {&before, &after}) pours.push_back(std::make_unique<Frames>(*path));
   for (const auto& path : spread) pours.push_back(std::make_unique<Frames>(path));
   for (const auto& pour : pours) require_same_scene(*pours[0], *pour);
   const Scene scene = parse_scene(pours[0]->scene(), before.string());
 
-  PourDiff diff;
+  Difference diff;
   diff.particles = pours[0]->particles();
   diff.factor = factor;
   diff.spread_pours = spread.empty() ? 0 : static_cast<std::int64_t>(spread.size()) + 1;
@@ -219,7 +219,7 @@ PourDiff pour_difference(const std::filesystem::path& before, const std::filesys
   return diff;
 }
 
-std::string pour_diff_line(const PourDiff& diff) {
+std::string difference_line(const Difference& diff) {
   std::string line = fmt::format("{} frames of {} particles", diff.frames.size(), diff.particles);
   if (diff.frames_missing > 0) line += fmt::format(" ({} not written in all)", diff.frames_missing);
   const std::int64_t first = diff.first_difference();
@@ -231,10 +231,10 @@ std::string pour_diff_line(const PourDiff& diff) {
   const auto beyond = diff.beyond();
   if (beyond.frame < 0) return line + fmt::format(": within the spread of {} pours", diff.spread_pours);
   return line + fmt::format(": beyond the spread of {} pours in frame {} by {}, {:.3g} times", diff.spread_pours,
-                            beyond.frame, pour_fields[beyond.field], beyond.times);
+                            beyond.frame, compared_fields[beyond.field], beyond.times);
 }
 
-std::string pour_diff_text(const PourDiff& diff) {
+std::string difference_text(const Difference& diff) {
   const bool spread = diff.spread_pours > 0;
   std::string text =
       fmt::format("{:>6} {:>9}  {:>9} {:>9} {:>9} {:>9} {:>9} {:>9}{}\n", "frame", "time (s)", "rms (dx)", "max (dx)",
@@ -246,7 +246,7 @@ std::string pour_diff_text(const PourDiff& diff) {
     if (spread) {
       double most = 0;
       std::size_t field = 0;
-      for (std::size_t d = 0; d < judged_pour_fields; ++d) {
+      for (std::size_t d = 0; d < judged_fields; ++d) {
         const double spread_of = std::max(f.spread[d], d == elsewhere ? 1.0 : 0.0);
         const double times = f.distance[d] == 0 ? 0 : f.distance[d] / spread_of;
         if (!(times <= most)) {
@@ -254,18 +254,18 @@ std::string pour_diff_text(const PourDiff& diff) {
           field = d;
         }
       }
-      text += most == 0 ? fmt::format("  {:>6}", 0) : fmt::format("  {:>6.3g} {}", most, pour_fields[field]);
+      text += most == 0 ? fmt::format("  {:>6}", 0) : fmt::format("  {:>6.3g} {}", most, compared_fields[field]);
     }
     while (text.back() == ' ') text.pop_back();
     text += '\n';
   }
-  return text + "\n" + wrapped(pour_diff_line(diff), 0);
+  return text + "\n" + wrapped(difference_line(diff), 0);
 }
 
-std::string pour_diff_json(const PourDiff& diff, int exit_status) {
+std::string difference_json(const Difference& diff, int exit_status) {
   const auto beyond = diff.beyond();
   nlohmann::ordered_json all = {{"kind", "pours"},
-                                {"summary", pour_diff_line(diff)},
+                                {"summary", difference_line(diff)},
                                 {"exit_status", exit_status},
                                 {"particles", diff.particles},
                                 {"frames_missing", diff.frames_missing},
@@ -276,7 +276,7 @@ std::string pour_diff_json(const PourDiff& diff, int exit_status) {
   if (diff.first_difference() >= 0)
     all["first_difference"] = {{"frame", diff.first_difference()}, {"fields", diff.first_fields()}};
   if (beyond.frame >= 0) {
-    all["beyond"] = {{"frame", beyond.frame}, {"field", pour_fields[beyond.field]}};
+    all["beyond"] = {{"frame", beyond.frame}, {"field", compared_fields[beyond.field]}};
     if (std::isfinite(beyond.times)) all["beyond"]["times"] = beyond.times;
   }
   auto frames = nlohmann::ordered_json::array();
@@ -290,10 +290,10 @@ std::string pour_diff_json(const PourDiff& diff, int exit_status) {
     frames.push_back(std::move(frame));
   }
   nlohmann::ordered_json units;
-  for (std::size_t k = 0; k < pour_fields.size(); ++k) units[pour_fields[k]] = pour_field_units[k];
+  for (std::size_t k = 0; k < compared_fields.size(); ++k) units[compared_fields[k]] = compared_field_units[k];
   all["units"] = units;
   all["by_frame"] = std::move(frames);
   return all.dump(2);
 }
 
-}  // namespace decant
+}  // namespace decant::pour

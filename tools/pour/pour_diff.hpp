@@ -9,17 +9,17 @@
 #include <string>
 #include <vector>
 
-namespace decant {
+namespace decant::pour {
 
 /// What is compared of a frame. Over particles: the root mean square of |x_a − x_b| by the nearest
 /// image, of |v_a − v_b|, of the differences in density and pressure; how many particles are in
 /// another place (source, receiver, …). Of the sums: |a − b| of the kinetic energy, which is told and
 /// not judged, because one number of a few pours may be near by chance.
-inline constexpr std::array<const char*, 6> pour_fields = {"position", "velocity",  "density",
-                                                           "pressure", "elsewhere", "kinetic_energy"};
-inline constexpr std::array<const char*, 6> pour_field_units = {"dx", "m/s", "kg/m^3", "Pa", "particles", "J"};
-inline constexpr std::size_t judged_pour_fields = 5;
-using FieldDistances = std::array<double, pour_fields.size()>;
+inline constexpr std::array<const char*, 6> compared_fields = {"position", "velocity",  "density",
+                                                               "pressure", "elsewhere", "kinetic_energy"};
+inline constexpr std::array<const char*, 6> compared_field_units = {"dx", "m/s", "kg/m^3", "Pa", "particles", "J"};
+inline constexpr std::size_t judged_fields = 5;
+using FieldDistances = std::array<double, compared_fields.size()>;
 
 struct FrameDifference {
   std::int64_t frame = 0;
@@ -31,7 +31,7 @@ struct FrameDifference {
 };
 
 /// Two pours apart.
-struct PourDiff {
+struct Difference {
   std::int64_t particles = 0;
   std::int64_t frames_missing = 0;  // of the scene's, not written in both
   std::int64_t spread_pours = 0;    // BEFORE and those given beside; 0: no spread is known
@@ -61,16 +61,16 @@ bool is_pour(const std::filesystem::path& path);
 /// Reads the frames that all of the pours have. \param spread  pours of the same scene from perturbed
 /// starts; with `before` they make the spread. Throws InputError where a folder holds no frames, or
 /// another scene or another number of particles than `before`.
-PourDiff pour_difference(const std::filesystem::path& before, const std::filesystem::path& after,
-                         const std::vector<std::filesystem::path>& spread, double factor = 3);
+Difference difference(const std::filesystem::path& before, const std::filesystem::path& after,
+                      const std::vector<std::filesystem::path>& spread, double factor = 3);
 
 /// For a terminal, at most 100 columns: some of the frames, last one line for the whole.
-std::string pour_diff_text(const PourDiff& diff);
+std::string difference_text(const Difference& diff);
 
 /// That line.
-std::string pour_diff_line(const PourDiff& diff);
+std::string difference_line(const Difference& diff);
 
 /// All of it. \param exit_status  what the command ends with
-std::string pour_diff_json(const PourDiff& diff, int exit_status);
+std::string difference_json(const Difference& diff, int exit_status);
 
-}  // namespace decant
+}  // namespace decant::pour

@@ -11,7 +11,7 @@
 #include <algorithm>
 #include <string>
 
-namespace decant {
+namespace decant::pour {
 namespace fs = std::filesystem;
 namespace {
 
@@ -27,7 +27,7 @@ std::string size_text(double bytes) {
 
 }  // namespace
 
-void check_pour_folder(const PourOptions& options, const PourFiles& files) {
+void check_folder(const Options& options, const Files& files) {
   const auto refuse = [&](const char* option, const char* why) {
     throw InputError("command line", option, options.out.string(), why);
   };
@@ -40,19 +40,19 @@ void check_pour_folder(const PourOptions& options, const PourFiles& files) {
   if (!options.resume && complete) refuse("--out", "holds a pour already; name another folder");
 }
 
-void check_room(const PourOptions& options, const PourFiles& files, const FrameLayout& layout,
-                std::int64_t frames_done) {
+void check_room(const Options& options, const Files& files, const frames::Layout& layout, std::int64_t frames_done) {
   const double share = 1.0 - static_cast<double>(frames_done) / static_cast<double>(layout.frames);
   // Checkpoints: state in double, twice while one replaces the other. A vertex a particle. Per frame: XDMF, VTKHDF
   // and timeline.
   const std::int64_t beside = (2 * 48 + 16) * layout.particles + 4000 * layout.frames;
   const double needed =
-      static_cast<double>(std::max<std::int64_t>(frame_file_bytes(layout) - bytes_on_disk(files.partial), 0) + beside) +
-      (options.csv ? share * static_cast<double>(csv_bytes(layout)) : 0.0);
+      static_cast<double>(std::max<std::int64_t>(frames::file_bytes(layout) - bytes_on_disk(files.partial), 0) +
+                          beside) +
+      (options.csv ? share * static_cast<double>(frames::csv_bytes(layout)) : 0.0);
   fs::path there = fs::absolute(options.out);
   while (!fs::exists(there) && there.has_relative_path()) there = there.parent_path();
   const auto available = static_cast<double>(fs::space(there).available);
-  const std::int64_t all_frames = frame_file_bytes(layout) + (options.csv ? csv_bytes(layout) : 0);
+  const std::int64_t all_frames = frames::file_bytes(layout) + (options.csv ? frames::csv_bytes(layout) : 0);
   if (!options.quiet)
     fmt::print(stderr, "disk: {} frames of {}, needs {}, {} free\n", layout.frames - frames_done,
                size_text(static_cast<double>(all_frames) / static_cast<double>(layout.frames)), size_text(needed),
@@ -62,4 +62,4 @@ void check_room(const PourOptions& options, const PourFiles& files, const FrameL
                      fmt::format("needs {}, free are {}", size_text(needed), size_text(available)));
 }
 
-}  // namespace decant
+}  // namespace decant::pour

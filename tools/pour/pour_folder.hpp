@@ -8,11 +8,11 @@
 #include <cstdint>
 #include <filesystem>
 
-namespace decant {
+namespace decant::pour {
 
 /// The files of one output folder.
-struct PourFiles {
-  explicit PourFiles(const std::filesystem::path& folder)
+struct Files {
+  explicit Files(const std::filesystem::path& folder)
       : frames(folder / "frames.h5"),
         partial(folder / "frames.h5.partial"),
         checkpoint(folder / "checkpoint.h5"),
@@ -29,11 +29,10 @@ struct PourFiles {
 };
 
 /// Refuses a folder that a new pour would overwrite, or that has nothing to resume. Throws InputError.
-void check_pour_folder(const PourOptions& options, const PourFiles& files);
+void check_folder(const Options& options, const Files& files);
 
 /// Compares what the pour still needs with what the disk has, and says so. Throws InputError where the
 /// disk has less. \param frames_done  frames that are written already
-void check_room(const PourOptions& options, const PourFiles& files, const FrameLayout& layout,
-                std::int64_t frames_done);
+void check_room(const Options& options, const Files& files, const frames::Layout& layout, std::int64_t frames_done);
 
-}  // namespace decant
+}  // namespace decant::pour

@@ -9,10 +9,10 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-namespace decant {
+namespace decant::pour {
 
-std::string pour_json(const PourResult& result, const BackendInfo& info, const std::string& out) {
-  const PourSummary& s = result.summary;
+std::string result_json(const Result& result, const BackendInfo& info, const std::string& out) {
+  const Summary& s = result.summary;
   nlohmann::ordered_json places, stages;
   for (std::size_t p = 0; p < region_names.size(); ++p)
     places[region_names[p]] = {{"mass_kg", s.mass_at[p]}, {"fraction", s.fraction_at[p]}};
@@ -69,8 +69,8 @@ std::string pour_json(const PourResult& result, const BackendInfo& info, const s
   return all.dump(2);
 }
 
-void print_pour(const PourResult& result, const BackendInfo& info, const Scene& scene) {
-  const PourSummary& s = result.summary;
+void print_result(const Result& result, const BackendInfo& info, const Scene& scene) {
+  const Summary& s = result.summary;
   fmt::print("{}: {} particles, {} frames, {} substeps of {:.3g} s; {} ({}) on {}\n", scene.name, s.particles, s.frames,
              s.substeps, scene.time_step(), info.name, info.precision, info.device);
   for (std::size_t p = 0; p < region_names.size(); ++p)
@@ -99,4 +99,4 @@ void print_pour(const PourResult& result, const BackendInfo& info, const Scene& 
              result.wait_seconds);
 }
 
-}  // namespace decant
+}  // namespace decant::pour

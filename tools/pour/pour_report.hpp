@@ -8,12 +8,12 @@
 
 #include <string>
 
-namespace decant {
+namespace decant::pour {
 
 /// The summary as JSON. \param out  the output folder
-std::string pour_json(const PourResult& result, const BackendInfo& info, const std::string& out);
+std::string result_json(const Result& result, const BackendInfo& info, const std::string& out);
 
 /// The summary in lines, to standard output.
-void print_pour(const PourResult& result, const BackendInfo& info, const Scene& scene);
+void print_result(const Result& result, const BackendInfo& info, const Scene& scene);
 
-}  // namespace decant
+}  // namespace decant::pour

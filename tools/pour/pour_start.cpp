@@ -5,7 +5,7 @@
 
 #include <random>
 
-namespace decant {
+namespace decant::pour {
 
 ParticleState perturbed_start(ParticleState state, std::uint32_t seed) {
   std::mt19937 random(seed);
@@ -23,4 +23,4 @@ Scene with_frames(Scene scene, int frames) {
   return scene;
 }
 
-}  // namespace decant
+}  // namespace decant::pour

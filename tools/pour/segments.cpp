@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace decant {
+namespace decant::pour {
 namespace {
 
 /// How often walls are looked at between two frames. Paths are followed as straight lines: what moves
@@ -47,4 +47,4 @@ bool Segments::meet_at(std::int64_t done) const {
   return done > begin && end_of(done - 1) == done;
 }
 
-}  // namespace decant
+}  // namespace decant::pour

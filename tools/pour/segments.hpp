@@ -6,7 +6,7 @@
 
 #include <cstdint>
 
-namespace decant {
+namespace decant::pour {
 
 /// The segments of a frame, one `advance` each. They follow from the scene alone: neighbor lists begin
 /// anew with each of them, so that a pour which is resumed at the end of any of them has the bits of one
@@ -35,4 +35,4 @@ class Segments {
   std::int64_t all_, samples_;
 };
 
-}  // namespace decant
+}  // namespace decant::pour

@@ -12,7 +12,7 @@
 #include <stdexcept>
 #include <utility>
 
-namespace decant {
+namespace decant::pour {
 namespace {
 
 struct RealColumn {
@@ -158,8 +158,8 @@ void write_timeline(const std::filesystem::path& file, const Timeline& timeline,
   out.commit();
 }
 
-PourSummary summarise(const Timeline& timeline, std::int64_t particles, double mass) {
-  PourSummary s;
+Summary summarise(const Timeline& timeline, std::int64_t particles, double mass) {
+  Summary s;
   if (timeline.rows.empty()) return s;
   s.particles = particles;
   s.mass = mass * static_cast<double>(particles);
@@ -199,4 +199,4 @@ PourSummary summarise(const Timeline& timeline, std::int64_t particles, double m
   return s;
 }
 
-}  // namespace decant
+}  // namespace decant::pour

@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-namespace decant {
+namespace decant::pour {
 
 /// One frame's row.
 struct TimelineRow {
@@ -76,7 +76,7 @@ void write_timeline(const std::filesystem::path& file, const Timeline& timeline,
                     const std::map<std::string, std::string>& texts);
 
 /// What the rows say in the end.
-struct PourSummary {
+struct Summary {
   std::int64_t particles = 0, frames = 0, substeps = 0;
   std::array<double, region_names.size()> mass_at{};               // kg, at the end
   std::array<double, region_names.size()> fraction_at{};           // of the whole mass
@@ -96,6 +96,6 @@ struct PourSummary {
 };
 
 /// \param mass  kg, of one particle
-PourSummary summarise(const Timeline& timeline, std::int64_t particles, double mass);
+Summary summarise(const Timeline& timeline, std::int64_t particles, double mass);
 
-}  // namespace decant
+}  // namespace decant::pour

@@ -2,11 +2,11 @@
 /// The table of cases: scene, what resolution counts, which resolutions are run where.
 #include "tools/validation/observers.hpp"
 
-namespace decant {
+namespace decant::validate {
 
-const std::vector<ValidationCase>& validation_cases() {
+const std::vector<Case>& cases() {
   // Resolutions: what a GPU runs unasked; the finest that the host runs unasked; the one of --quick.
-  static const std::vector<ValidationCase> all = {
+  static const std::vector<Case> all = {
       {"free-fall",
        "A stretched ball in free fall keeps the path of its centre",
        "exact",
@@ -110,4 +110,4 @@ const std::vector<ValidationCase>& validation_cases() {
   return all;
 }
 
-}  // namespace decant
+}  // namespace decant::validate

@@ -12,7 +12,7 @@
 #include <numeric>
 #include <string>
 
-namespace decant {
+namespace decant::validate {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -118,4 +118,4 @@ double slope(const Curve& curve, double a, double b) {
   return xx > 0 ? xy / xx : nan;
 }
 
-}  // namespace decant
+}  // namespace decant::validate

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-namespace decant {
+namespace decant::validate {
 
 /// Points in ascending x.
 struct Curve {
@@ -35,4 +35,4 @@ double slope(const Curve& curve, double a, double b);
 /// The points with a <= x <= b.
 Curve part_of(const Curve& curve, double a, double b);
 
-}  // namespace decant
+}  // namespace decant::validate

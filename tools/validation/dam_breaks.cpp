@@ -9,7 +9,7 @@
 #include <array>
 #include <cmath>
 
-namespace decant {
+namespace decant::validate {
 namespace {
 
 constexpr std::int64_t fewest_neighbors = 6;  // of what counts as water and not as spray
@@ -24,9 +24,9 @@ Vec3 column_of(const Scene& scene) {
 
 /// Front Z = x/a over T = t√(2g/a), height at the back wall over τ = t√(g/a), a the column's width, its
 /// height 2a.
-class DamFront : public CaseObserver {
+class DamFront : public Observer {
  public:
-  explicit DamFront(const CaseInputs& inputs)
+  explicit DamFront(const Inputs& inputs)
       : scene_(inputs.scene),
         a_(column_of(inputs.scene).x()),
         width_(column_of(inputs.scene).y()),
@@ -48,7 +48,7 @@ class DamFront : public CaseObserver {
     height_.y.push_back(height / (2 * a_));
   }
 
-  void finish(ValidationResult& result) override {
+  void finish(Result& result) override {
     const Curve front = read_curve(folder_ / "martin_moyce_table2_front.csv"),
                 height = read_curve(folder_ / "martin_moyce_table6_height.csv");
     // Coarser than 20 spacings to the column's width the gates do not apply.
@@ -108,10 +108,10 @@ struct Probe {
 };
 
 /// Pressure p* = p/(ρ g H) over t* = t√(g/H) on patches of a wall or of an obstacle that the wave hits.
-class Impact : public CaseObserver {
+class Impact : public Observer {
  public:
   /// \param face  x of the surface that is hit, m; \param direction  +1 where the wave runs along +x
-  Impact(const CaseInputs& inputs, double face, int direction, double y_min, double y_max, std::vector<Probe> probes)
+  Impact(const Inputs& inputs, double face, int direction, double y_min, double y_max, std::vector<Probe> probes)
       : scene_(inputs.scene),
         folder_(inputs.experiments),
         height_(column_of(inputs.scene).z()),
@@ -137,7 +137,7 @@ class Impact : public CaseObserver {
     }
   }
 
-  void finish(ValidationResult& result) override {
+  void finish(Result& result) override {
     for (std::size_t k = 0; k < probes_.size(); ++k) {
       const Probe& probe = probes_[k];
       const Curve measured = read_curve(folder_ / probe.file);
@@ -180,9 +180,9 @@ SolidBox tank_of(const Scene& scene) { return std::get<BoxShape>(scene.container
 
 }  // namespace
 
-std::unique_ptr<CaseObserver> observe_dam_front(const CaseInputs& inputs) { return std::make_unique<DamFront>(inputs); }
+std::unique_ptr<Observer> observe_dam_front(const Inputs& inputs) { return std::make_unique<DamFront>(inputs); }
 
-std::unique_ptr<CaseObserver> observe_dam_wall(const CaseInputs& inputs) {
+std::unique_ptr<Observer> observe_dam_wall(const Inputs& inputs) {
   const SolidBox tank = tank_of(inputs.scene);
   // Buchner's column was twice as high: his probe stands at a fifth of the column's height.
   const double H = column_of(inputs.scene).z();
@@ -193,7 +193,7 @@ std::unique_ptr<CaseObserver> observe_dam_wall(const CaseInputs& inputs) {
                                                      {"Buchner, 0.2 H", "buchner_2002_p.csv", 0.2 * H, true}});
 }
 
-std::unique_ptr<CaseObserver> observe_dam_obstacle(const CaseInputs& inputs) {
+std::unique_ptr<Observer> observe_dam_obstacle(const Inputs& inputs) {
   // The last solid of the list is the obstacle.
   const SolidBox box = std::get<BoxShape>(inputs.scene.containers.at(0).shape).solid.back();
   return std::make_unique<Impact>(inputs, box.max.x(), -1, box.min.y(), box.max.y(),
@@ -201,4 +201,4 @@ std::unique_ptr<CaseObserver> observe_dam_obstacle(const CaseInputs& inputs) {
                                                      {"Kleefsman, P3", "kleefsman_2005_p3.csv", 0.101, true}});
 }
 
-}  // namespace decant
+}  // namespace decant::validate

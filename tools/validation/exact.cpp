@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace decant {
+namespace decant::validate {
 namespace {
 
 using std::numbers::pi;
@@ -54,4 +54,4 @@ double cup_residual(double R, double Hc, double angle) {
   return Hc / (3 * c) * (s * (3 * R * R - s * s) + 3 * R * R * (c - R) * phi);
 }
 
-}  // namespace decant
+}  // namespace decant::validate

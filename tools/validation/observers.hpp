@@ -7,18 +7,18 @@
 
 #include <memory>
 
-namespace decant {
+namespace decant::validate {
 
-std::unique_ptr<CaseObserver> observe_free_fall(const CaseInputs& inputs);
-std::unique_ptr<CaseObserver> observe_still_water(const CaseInputs& inputs);
-std::unique_ptr<CaseObserver> observe_couette(const CaseInputs& inputs);
-std::unique_ptr<CaseObserver> observe_poiseuille(const CaseInputs& inputs);
-std::unique_ptr<CaseObserver> observe_drop(const CaseInputs& inputs);
-std::unique_ptr<CaseObserver> observe_dam_front(const CaseInputs& inputs);
-std::unique_ptr<CaseObserver> observe_dam_wall(const CaseInputs& inputs);
-std::unique_ptr<CaseObserver> observe_dam_obstacle(const CaseInputs& inputs);
-std::unique_ptr<CaseObserver> observe_slit(const CaseInputs& inputs);
-std::unique_ptr<CaseObserver> observe_slow_pour(const CaseInputs& inputs);
+std::unique_ptr<Observer> observe_free_fall(const Inputs& inputs);
+std::unique_ptr<Observer> observe_still_water(const Inputs& inputs);
+std::unique_ptr<Observer> observe_couette(const Inputs& inputs);
+std::unique_ptr<Observer> observe_poiseuille(const Inputs& inputs);
+std::unique_ptr<Observer> observe_drop(const Inputs& inputs);
+std::unique_ptr<Observer> observe_dam_front(const Inputs& inputs);
+std::unique_ptr<Observer> observe_dam_wall(const Inputs& inputs);
+std::unique_ptr<Observer> observe_dam_obstacle(const Inputs& inputs);
+std::unique_ptr<Observer> observe_slit(const Inputs& inputs);
+std::unique_ptr<Observer> observe_slow_pour(const Inputs& inputs);
 
 /// Velocity of plane Couette flow from rest at a height z above the plate at rest, m/s:
 ///   u = V z/L + Σ_n (2V/nπ)(−1)ⁿ sin(nπz/L) e^{−n²π²νt/L²}
@@ -44,4 +44,4 @@ double drop_axis(double A, double t);
 /// \param R  m, inner radius; \param Hc  m, inner height; \param angle  rad
 double cup_residual(double R, double Hc, double angle);
 
-}  // namespace decant
+}  // namespace decant::validate

@@ -7,14 +7,14 @@
 #include <cmath>
 #include <numbers>
 
-namespace decant {
+namespace decant::validate {
 namespace {
 
 /// Torricelli: √h falls at the rate C_d (a/A) √(g/2), C_d = π/(π + 2) = 0.611 of a slit with sharp edges
 /// (Kirchhoff 1869). h is the volume above the slit over the tank's area.
-class Slit : public CaseObserver {
+class Slit : public Observer {
  public:
-  explicit Slit(const CaseInputs& inputs) : scene_(inputs.scene) {
+  explicit Slit(const Inputs& inputs) : scene_(inputs.scene) {
     // The two plates beside the slit come first in the list of solids; they end the upper tank.
     const BoxShape& shape = std::get<BoxShape>(scene_.containers.at(0).shape);
     const SolidBox &left = shape.solid.at(0), &right = shape.solid.at(1);
@@ -31,7 +31,7 @@ class Slit : public CaseObserver {
     root_.y.push_back(std::sqrt(h));
   }
 
-  void finish(ValidationResult& result) override {
+  void finish(Result& result) override {
     // From where the flow has established itself to where the surface dips towards the slit.
     Curve steady;
     for (std::size_t k = 0; k < root_.x.size(); ++k)
@@ -61,10 +61,9 @@ class Slit : public CaseObserver {
 };
 
 /// What the cup holds at the end of each pause of its tilt against the exact volume below its lip.
-class SlowPour : public CaseObserver {
+class SlowPour : public Observer {
  public:
-  explicit SlowPour(const CaseInputs& inputs)
-      : scene_(inputs.scene), resolution_(inputs.resolution), audit_(inputs.scene) {
+  explicit SlowPour(const Inputs& inputs) : scene_(inputs.scene), resolution_(inputs.resolution), audit_(inputs.scene) {
     const auto& cup = std::get<RevolvedShape>(scene_.containers.at(0).shape).profile;
     // The lip is the innermost point of the highest ones; the bottom meets the axis.
     double top = -INFINITY, bottom = -INFINITY;
@@ -85,10 +84,10 @@ class SlowPour : public CaseObserver {
     inside_ += audit.inside;
   }
 
-  void finish(ValidationResult& result) override {
+  void finish(Result& result) override {
     const double whole = std::numbers::pi * radius_ * radius_ * height_;
     const auto& keys = scene_.containers.at(0).tilt->keys;
-    ValidationCurve exact{"volume", "exact, slow", "t", "s", "volume", "mL", true, {}, {}};
+    NamedCurve exact{"volume", "exact, slow", "t", "s", "volume", "mL", true, {}, {}};
     for (std::size_t k = 1; k < keys.size(); ++k) {
       if (keys[k].angle != keys[k - 1].angle) continue;  // a pause is two keys of one angle
       const double angle = keys[k].angle, end = std::min(keys[k].time, volume_.x.back());
@@ -105,7 +104,7 @@ class SlowPour : public CaseObserver {
       exact.y.insert(exact.y.end(), {1e6 * should, 1e6 * should, NAN});
     }
     result.add({"particles seen inside a wall", "1", 0, static_cast<double>(inside_), static_cast<double>(inside_), 0});
-    ValidationCurve found{"volume", "simulated", "t", "s", "volume", "mL", false, volume_.x, {}};
+    NamedCurve found{"volume", "simulated", "t", "s", "volume", "mL", false, volume_.x, {}};
     for (const double v : volume_.y) found.y.push_back(1e6 * v);
     result.curves.push_back(std::move(exact));
     result.curves.push_back(std::move(found));
@@ -122,8 +121,8 @@ class SlowPour : public CaseObserver {
 
 }  // namespace
 
-std::unique_ptr<CaseObserver> observe_slit(const CaseInputs& inputs) { return std::make_unique<Slit>(inputs); }
+std::unique_ptr<Observer> observe_slit(const Inputs& inputs) { return std::make_unique<Slit>(inputs); }
 
-std::unique_ptr<CaseObserver> observe_slow_pour(const CaseInputs& inputs) { return std::make_unique<SlowPour>(inputs); }
+std::unique_ptr<Observer> observe_slow_pour(const Inputs& inputs) { return std::make_unique<SlowPour>(inputs); }
 
-}  // namespace decant
+}  // namespace decant::validate

@@ -8,7 +8,7 @@
 
 #include <algorithm>
 
-namespace decant {
+namespace decant::validate {
 namespace {
 
 /// Columns that a text takes on a screen: bytes that continue a character take none.
@@ -29,13 +29,13 @@ std::string share(double value) {
   return value < 1e-4 ? fmt::format("{:.1e}", value) : fmt::format("{:.2f} %", 100 * value);
 }
 
-const char* verdict_of(const ValidationQuantity& quantity) {
+const char* verdict_of(const Quantity& quantity) {
   return !quantity.gated() ? "reported" : quantity.met() ? "pass" : "fail";
 }
 
 }  // namespace
 
-std::string validation_table(const std::vector<ValidationResult>& results) {
+std::string table(const std::vector<Result>& results) {
   std::size_t wide = 20;
   for (const auto& result : results)
     for (const auto& quantity : result.quantities)
@@ -65,8 +65,7 @@ std::string validation_table(const std::vector<ValidationResult>& results) {
   return text;
 }
 
-void write_validation(const std::filesystem::path& file, const std::vector<ValidationResult>& results,
-                      const std::string& interrupted) {
+void write(const std::filesystem::path& file, const std::vector<Result>& results, const std::string& interrupted) {
   Hdf5Writer out(file);
   out.attribute("/", "decant_validation", 1);
   for (const auto& [key, value] : build_provenance()) out.attribute("/provenance", key, value);
@@ -87,7 +86,7 @@ void write_validation(const std::filesystem::path& file, const std::vector<Valid
     for (std::size_t k = 0; k < rows.size(); ++k) values[static_cast<Eigen::Index>(k)] = get(rows[k]);
     return values;
   };
-  using Run = ValidationResult;
+  using Run = Result;
   out.strings("/runs/case", column(results, [](const Run& r) { return r.name; }), "name");
   out.strings("/runs/source", column(results, [](const Run& r) { return r.source; }), "who says what is right");
   out.strings("/runs/backend", column(results, [](const Run& r) { return r.backend.name; }), "name");
@@ -109,7 +108,7 @@ void write_validation(const std::filesystem::path& file, const std::vector<Valid
 
   struct Row {
     std::int64_t run;
-    const ValidationQuantity* quantity;
+    const Quantity* quantity;
   };
   std::vector<Row> rows;
   for (std::size_t r = 0; r < results.size(); ++r)
@@ -155,4 +154,4 @@ void write_validation(const std::filesystem::path& file, const std::vector<Valid
   out.commit();
 }
 
-}  // namespace decant
+}  // namespace decant::validate

@@ -9,19 +9,17 @@
 
 #include <chrono>
 
-namespace decant {
+namespace decant::validate {
 
-bool ValidationResult::passed() const {
+bool Result::passed() const {
   for (const auto& quantity : quantities)
     if (!quantity.met()) return false;
   return true;
 }
 
-ValidationQuantity& ValidationResult::add(ValidationQuantity quantity) {
-  return quantities.emplace_back(std::move(quantity));
-}
+Quantity& Result::add(Quantity quantity) { return quantities.emplace_back(std::move(quantity)); }
 
-Scene scene_of(const ValidationCase& which, int resolution, const std::filesystem::path& scenes) {
+Scene scene_of(const Case& which, int resolution, const std::filesystem::path& scenes) {
   const auto file = scenes / which.scene;
   Scene scene = load_scene(file);
   scene.particle_spacing = which.length / resolution;
@@ -38,11 +36,11 @@ void require_ok(const Backend& backend, const Status& status) {
 
 }  // namespace
 
-ValidationResult run_case(const ValidationCase& which, int resolution, const Scene& scene, Backend& backend,
-                          const std::filesystem::path& experiments, const std::function<void(int)>& frame_done) {
+Result run(const Case& which, int resolution, const Scene& scene, Backend& backend,
+           const std::filesystem::path& experiments, const std::function<void(int)>& frame_done) {
   const Walls walls = sample_walls(scene);
   ParticleState state = initial_state(scene);
-  ValidationResult result;
+  Result result;
   result.name = which.name;
   result.source = which.source;
   result.resolution = resolution;
@@ -73,11 +71,11 @@ ValidationResult run_case(const ValidationCase& which, int resolution, const Sce
   return result;
 }
 
-std::vector<ObservedOrder> observed_orders(const std::vector<ValidationResult>& results) {
+std::vector<ObservedOrder> observed_orders(const std::vector<Result>& results) {
   std::vector<ObservedOrder> orders;
   for (std::size_t k = 0; k < results.size(); ++k) {
-    const ValidationResult& fine = results[k];
-    const ValidationResult* coarse = nullptr;  // the next coarser one of the same case and backend
+    const Result& fine = results[k];
+    const Result* coarse = nullptr;  // the next coarser one of the same case and backend
     for (const auto& other : results)
       if (other.name == fine.name && other.backend.name == fine.backend.name &&
           other.backend.options == fine.backend.options && other.resolution < fine.resolution &&
@@ -94,4 +92,4 @@ std::vector<ObservedOrder> observed_orders(const std::vector<ValidationResult>& 
   return orders;
 }
 
-}  // namespace decant
+}  // namespace decant::validate

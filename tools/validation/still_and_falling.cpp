@@ -8,16 +8,16 @@
 #include <cmath>
 #include <numbers>
 
-namespace decant {
+namespace decant::validate {
 namespace {
 
 /// Against the integrator's own exact solution: v = v0 + g n dt, x = x0 + v0 n dt + g dt² n(n+1)/2, because
 /// pair forces cancel in the sum. What rounding may add is followed along the run: in each substep
 /// the tolerance of an acceleration times dt (oracle/solution/tolerance.hpp; averaged over particles, signs taken
 /// as all alike), two roundings of the velocity and two of the position.
-class FreeFall : public CaseObserver {
+class FreeFall : public Observer {
  public:
-  explicit FreeFall(const CaseInputs& inputs)
+  explicit FreeFall(const Inputs& inputs)
       : scene_(inputs.scene), walls_(inputs.walls), unit_(inputs.single_precision ? unit_roundoff : 0x1p-53) {}
 
   void sample(const Moment& moment) override {
@@ -45,7 +45,7 @@ class FreeFall : public CaseObserver {
     farthest_ = std::max(farthest_, moment.state.position.cwiseAbs().maxCoeff());
   }
 
-  void finish(ValidationResult& result) override {
+  void finish(Result& result) override {
     result.add({"mean velocity", "m/s", gained_, gained_ + velocity_error_, velocity_error_ / gained_,
                 velocity_bound_ / gained_});
     result.add({"mean position", "m", fallen_, fallen_ + position_error_, position_error_ / fallen_,
@@ -96,9 +96,9 @@ Room room_of(const Scene& scene) {
 /// Against p = ρ g (H − z), H the level that the mass of the fluid stands for. Layer by layer of dx,
 /// averaged over the last quarter of the run, away from side walls by 2 dx; the particles beside
 /// the walls are told apart.
-class StillWater : public CaseObserver {
+class StillWater : public Observer {
  public:
-  explicit StillWater(const CaseInputs& inputs)
+  explicit StillWater(const Inputs& inputs)
       : scene_(inputs.scene),
         resolution_(inputs.resolution),
         room_(room_of(inputs.scene)),
@@ -129,9 +129,9 @@ class StillWater : public CaseObserver {
     }
   }
 
-  void finish(ValidationResult& result) override {
+  void finish(Result& result) override {
     const double scale = scene_.fluid.rest_density * scene_.gravity.norm();
-    ValidationCurve found{"pressure", "simulated", "p / ρgH", "1", "z / H", "1", false, {}, {}};
+    NamedCurve found{"pressure", "simulated", "p / ρgH", "1", "z / H", "1", false, {}, {}};
     double squares = 0, first = NAN, at_first = NAN;
     int counted = 0;
     for (const Layer& layer : layers_) {
@@ -175,10 +175,8 @@ class StillWater : public CaseObserver {
 
 }  // namespace
 
-std::unique_ptr<CaseObserver> observe_free_fall(const CaseInputs& inputs) { return std::make_unique<FreeFall>(inputs); }
+std::unique_ptr<Observer> observe_free_fall(const Inputs& inputs) { return std::make_unique<FreeFall>(inputs); }
 
-std::unique_ptr<CaseObserver> observe_still_water(const CaseInputs& inputs) {
-  return std::make_unique<StillWater>(inputs);
-}
+std::unique_ptr<Observer> observe_still_water(const Inputs& inputs) { return std::make_unique<StillWater>(inputs); }
 
-}  // namespace decant
+}  // namespace decant::validate

@@ -6,13 +6,13 @@
 #include <cmath>
 #include <string>
 
-namespace decant {
+namespace decant::validate {
 namespace {
 
 /// Velocity along x between plates at z = 0 and z = L against the start-up's series.
-class Channel : public CaseObserver {
+class Channel : public Observer {
  public:
-  Channel(const CaseInputs& inputs, double peak, std::function<double(double, double)> exact)
+  Channel(const Inputs& inputs, double peak, std::function<double(double, double)> exact)
       : scene_(inputs.scene),
         resolution_(inputs.resolution),
         length_(inputs.resolution * inputs.scene.particle_spacing),
@@ -30,7 +30,7 @@ class Channel : public CaseObserver {
     }
   }
 
-  void finish(ValidationResult& result) override {
+  void finish(Result& result) override {
     const auto worst = [](const std::vector<double>& y, std::size_t from) {
       double largest = from < y.size() ? 0.0 : NAN;
       for (std::size_t k = from; k < y.size(); ++k)
@@ -66,8 +66,8 @@ class Channel : public CaseObserver {
       sum[k] += moment.state.velocity(0, i);
       count[k] += 1;
     }
-    ValidationCurve found{"velocity", when, "z / L", "1", "u / peak", "1", false, {}, {}};
-    ValidationCurve exact = found;
+    NamedCurve found{"velocity", when, "z / L", "1", "u / peak", "1", false, {}, {}};
+    NamedCurve exact = found;
     exact.reference = true;
     for (std::size_t k = 0; k < sum.size(); ++k)
       if (count[k] > 0) {
@@ -88,13 +88,13 @@ class Channel : public CaseObserver {
   std::function<double(double z, double t)> exact_;
   Curve rms_;
   std::size_t first_judged_ = 0, drawn_ = 0;
-  std::vector<ValidationCurve> curves_;
+  std::vector<NamedCurve> curves_;
 };
 
 /// Axes by second moments, <x²> = a²/4 in an ellipse, against those of the ideal drop.
-class Drop : public CaseObserver {
+class Drop : public Observer {
  public:
-  explicit Drop(const CaseInputs& inputs)
+  explicit Drop(const Inputs& inputs)
       : scene_(inputs.scene), stretching_(inputs.scene.fills.at(0).velocity_gradient(2, 2)) {}
 
   void sample(const Moment& moment) override {
@@ -111,7 +111,7 @@ class Drop : public CaseObserver {
     extent_.push_back((0.5 * (z.maxCoeff() - z.minCoeff()) + 0.5 * scene_.particle_spacing) / radius_);
   }
 
-  void finish(ValidationResult& result) override {
+  void finish(Result& result) override {
     const Curve b{time_, long_}, a{time_, short_};
     for (const double t : {0.0008, 0.0038, 0.0076}) {
       const double exact = drop_axis(stretching_, t), found = value_at(b, t);
@@ -120,8 +120,8 @@ class Drop : public CaseObserver {
     }
     const double product = long_.back() * short_.back();
     result.add({"a·b at the end", "R²", 1, product, std::abs(product - 1)});
-    ValidationCurve exact{"axes", "b, exact", "t", "s", "semi-axis / R", "1", true, {}, {}};
-    ValidationCurve other = exact;
+    NamedCurve exact{"axes", "b, exact", "t", "s", "semi-axis / R", "1", true, {}, {}};
+    NamedCurve other = exact;
     other.name = "a, exact";
     for (int k = 0; k <= 40; ++k) {
       const double t = time_.back() * k / 40;
@@ -148,7 +148,7 @@ class Drop : public CaseObserver {
 
 }  // namespace
 
-std::unique_ptr<CaseObserver> observe_couette(const CaseInputs& inputs) {
+std::unique_ptr<Observer> observe_couette(const Inputs& inputs) {
   const Scene& scene = inputs.scene;
   double V = 0;
   for (const auto& plate : scene.containers) V += plate.surface_velocity.x();
@@ -156,7 +156,7 @@ std::unique_ptr<CaseObserver> observe_couette(const CaseInputs& inputs) {
   return std::make_unique<Channel>(inputs, V, [=](double z, double t) { return couette_velocity(V, nu, L, z, t); });
 }
 
-std::unique_ptr<CaseObserver> observe_poiseuille(const CaseInputs& inputs) {
+std::unique_ptr<Observer> observe_poiseuille(const Inputs& inputs) {
   const Scene& scene = inputs.scene;
   const double F = scene.gravity.x(), nu = scene.fluid.viscosity / scene.fluid.rest_density,
                L = inputs.resolution * scene.particle_spacing;
@@ -164,6 +164,6 @@ std::unique_ptr<CaseObserver> observe_poiseuille(const CaseInputs& inputs) {
                                    [=](double z, double t) { return poiseuille_velocity(F, nu, L, z, t); });
 }
 
-std::unique_ptr<CaseObserver> observe_drop(const CaseInputs& inputs) { return std::make_unique<Drop>(inputs); }
+std::unique_ptr<Observer> observe_drop(const Inputs& inputs) { return std::make_unique<Drop>(inputs); }
 
-}  // namespace decant
+}  // namespace decant::validate

@@ -12,7 +12,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-namespace decant {
+namespace decant::validate {
 namespace {
 
 /// Length of a row of equally spaced coordinates, each standing for one spacing.
@@ -74,4 +74,4 @@ double WallPatch::pressure(const ParticleState& state, const Fields& fields) con
   return force / area_;
 }
 
-}  // namespace decant
+}  // namespace decant::validate

@@ -7,7 +7,7 @@
 
 #include <vector>
 
-namespace decant {
+namespace decant::validate {
 
 /// Wall particles in a box, of a container that does not move.
 class WallPatch {
@@ -32,4 +32,4 @@ class WallPatch {
   double area_ = 0;
 };
 
-}  // namespace decant
+}  // namespace decant::validate
