@@ -8,6 +8,7 @@
 #include "gpu/core/cuda_check.hpp"
 #endif
 
+#include <utility>
 #include <vector>
 
 namespace decant::gpu {
@@ -18,6 +19,17 @@ namespace {
 /// hands a backend to another thread does so between its calls, at whose end all is done.
 inline const cudaStream_t own_stream = cudaStreamPerThread;
 #endif
+
+/// From device memory; all of it is there when the call returns.
+inline void copy_to_host(void* to, const void* from, std::size_t bytes) {
+  if (bytes == 0) return;
+#ifdef __CUDACC__
+  CUDA_CHECK(cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToHost, own_stream));
+  CUDA_CHECK(cudaStreamSynchronize(own_stream));
+#else
+  std::memcpy(to, from, bytes);
+#endif
+}
 
 /// Device memory of n elements, freed with the object.
 template <class T>
@@ -48,11 +60,11 @@ class Buffer {
   }
   std::vector<T> download(std::size_t n) const {
     std::vector<T> to(n);
-    copy_out(to.data(), data_, n * sizeof(T));
+    copy_to_host(to.data(), data_, n * sizeof(T));
     return to;
   }
   /// From an address inside.
-  void download_bytes(void* to, const void* from, std::size_t bytes) const { copy_out(to, from, bytes); }
+  void download_bytes(void* to, const void* from, std::size_t bytes) const { copy_to_host(to, from, bytes); }
   T* get() const { return data_; }
   std::size_t size() const { return size_; }
   std::size_t bytes() const { return size_ * sizeof(T); }
@@ -71,11 +83,6 @@ class Buffer {
   static void copy_in(void* to, const void* from, std::size_t bytes) {
     if (bytes) CUDA_CHECK(cudaMemcpyAsync(to, from, bytes, cudaMemcpyHostToDevice, own_stream));
   }
-  static void copy_out(void* to, const void* from, std::size_t bytes) {
-    if (bytes == 0) return;
-    CUDA_CHECK(cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToHost, own_stream));
-    CUDA_CHECK(cudaStreamSynchronize(own_stream));
-  }
   void release() {
     if (data_) cudaFreeAsync(data_, own_stream);  // a destructor has nobody to report to
     data_ = nullptr;
@@ -87,9 +94,6 @@ class Buffer {
     if (bytes) std::memset(p, 0xFF, bytes);
   }
   static void copy_in(void* to, const void* from, std::size_t bytes) {
-    if (bytes) std::memcpy(to, from, bytes);
-  }
-  static void copy_out(void* to, const void* from, std::size_t bytes) {
     if (bytes) std::memcpy(to, from, bytes);
   }
   void release() {
@@ -109,16 +113,17 @@ class PinnedBuffer {
   PinnedBuffer() = default;
   PinnedBuffer(const PinnedBuffer&) = delete;
   PinnedBuffer& operator=(const PinnedBuffer&) = delete;
-  ~PinnedBuffer() { release(); }
+  ~PinnedBuffer() { release(data_); }
 
   /// n floats from device memory, there until the next call.
   const float* download(const float* from, std::size_t n) {
     if (n > size_) {
-      release();
+      release(std::exchange(data_, nullptr));
+      size_ = 0;
       data_ = allocate(n);
       size_ = n;
     }
-    copy(data_, from, n);
+    copy_to_host(data_, from, n * sizeof(float));
     return data_;
   }
 
@@ -129,26 +134,10 @@ class PinnedBuffer {
     CUDA_CHECK(cudaMallocHost(&p, n * sizeof(float)));
     return static_cast<float*>(p);
   }
-  static void copy(float* to, const float* from, std::size_t n) {
-    if (n == 0) return;
-    CUDA_CHECK(cudaMemcpyAsync(to, from, n * sizeof(float), cudaMemcpyDeviceToHost, own_stream));
-    CUDA_CHECK(cudaStreamSynchronize(own_stream));
-  }
-  void release() {
-    if (data_) cudaFreeHost(data_);
-    data_ = nullptr;
-    size_ = 0;
-  }
+  static void release(float* p) { cudaFreeHost(p); }
 #else
   static float* allocate(std::size_t n) { return new float[n]; }
-  static void copy(float* to, const float* from, std::size_t n) {
-    if (n) std::memcpy(to, from, n * sizeof(float));
-  }
-  void release() {
-    delete[] data_;
-    data_ = nullptr;
-    size_ = 0;
-  }
+  static void release(float* p) { delete[] p; }
 #endif
   float* data_ = nullptr;
   std::size_t size_ = 0;

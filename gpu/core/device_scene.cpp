@@ -68,6 +68,33 @@ class FarthestMove {
   std::array<Vec3, 8> before_;
 };
 
+/// The same surface in fewer rectangles: two that share an edge of theirs and lie in one plane become one.
+std::vector<BoxFace> merged(std::vector<BoxFace> faces) {
+  const auto join = [](BoxFace& a, const BoxFace& b) {
+    if (a.axis != b.axis || a.side != b.side) return false;
+    for (int along = 0; along < 3; ++along) {
+      bool side_by_side = along != a.axis && (a.max[along] == b.min[along] || b.max[along] == a.min[along]);
+      for (int k = 0; k < 3; ++k) side_by_side &= k == along || (a.min[k] == b.min[k] && a.max[k] == b.max[k]);
+      if (!side_by_side) continue;
+      a.min = a.min.cwiseMin(b.min);
+      a.max = a.max.cwiseMax(b.max);
+      return true;
+    }
+    return false;
+  };
+  for (std::size_t k = 0; k < faces.size();) {
+    const auto other = std::find_if(faces.begin() + static_cast<std::ptrdiff_t>(k) + 1, faces.end(),
+                                    [&](const BoxFace& f) { return join(faces[k], f); });
+    if (other == faces.end()) {
+      ++k;
+      continue;
+    }
+    faces.erase(other);
+    k = 0;  // what was joined may join others
+  }
+  return faces;
+}
+
 }  // namespace
 
 Constants make_constants(const Scene& scene) {
@@ -127,37 +154,6 @@ Constants make_constants(const Scene& scene) {
   }
   return c;
 }
-
-namespace {
-
-/// The same surface in fewer rectangles: two that share an edge of theirs and lie in one plane become one.
-std::vector<BoxFace> merged(std::vector<BoxFace> faces) {
-  const auto join = [](BoxFace& a, const BoxFace& b) {
-    if (a.axis != b.axis || a.side != b.side) return false;
-    for (int along = 0; along < 3; ++along) {
-      bool side_by_side = along != a.axis && (a.max[along] == b.min[along] || b.max[along] == a.min[along]);
-      for (int k = 0; k < 3; ++k) side_by_side &= k == along || (a.min[k] == b.min[k] && a.max[k] == b.max[k]);
-      if (!side_by_side) continue;
-      a.min = a.min.cwiseMin(b.min);
-      a.max = a.max.cwiseMax(b.max);
-      return true;
-    }
-    return false;
-  };
-  for (std::size_t k = 0; k < faces.size();) {
-    const auto other = std::find_if(faces.begin() + static_cast<std::ptrdiff_t>(k) + 1, faces.end(),
-                                    [&](const BoxFace& f) { return join(faces[k], f); });
-    if (other == faces.end()) {
-      ++k;
-      continue;
-    }
-    faces.erase(other);
-    k = 0;  // what was joined may join others
-  }
-  return faces;
-}
-
-}  // namespace
 
 Geometry make_geometry(const Scene& scene) {
   Geometry g;

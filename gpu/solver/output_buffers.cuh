@@ -11,31 +11,19 @@ namespace {
 
 class OutputBuffers {
  public:
-  /// Of n particles. What no kernel writes after this reads as NaN or −1.
-  OutputArrays unwritten(int n) {
+  /// Of n particles; `all`, or density and pressure alone. What no kernel writes after this reads as NaN or −1.
+  OutputArrays unwritten(int n, bool all) {
     n_ = static_cast<std::size_t>(n);
-    memory_.resize(n_ * bytes);
+    all_ = all;
+    memory_.resize(n_ * (all ? bytes : density_bytes));
     return arrays();
-  }
-  /// For density and pressure alone.
-  OutputArrays unwritten_density(int n) {
-    n_ = static_cast<std::size_t>(n);
-    memory_.resize(2 * n_ * sizeof(float));
-    OutputArrays f{};
-    f.density = reinterpret_cast<float*>(memory_.get());
-    f.pressure = f.density + n_;
-    return f;
-  }
-  void download_density(HostFields& out) const {
-    const float* density = reinterpret_cast<const float*>(memory_.get());
-    out.density = values(density, n_);
-    out.pressure = values(density + n_, n_);
   }
   void clear() { memory_.resize(0); }
   void download(HostFields& out) const {
     const OutputArrays f = arrays();
     out.density = values(f.density, n_);
     out.pressure = values(f.pressure, n_);
+    if (!all_) return;
     out.pressure_acceleration = values(f.pressure_acceleration, 3 * n_);
     out.viscous_acceleration = values(f.viscous_acceleration, 3 * n_);
     out.wall_pressure_acceleration = values(f.wall_pressure_acceleration, 3 * n_);
@@ -49,11 +37,14 @@ class OutputBuffers {
   }
 
  private:
-  static constexpr std::size_t bytes = 2 * 8 + 15 * 4 + 4 * 4;  // per particle
+  static constexpr std::size_t density_bytes = 2 * 4, bytes = density_bytes + 2 * 8 + 15 * 4 + 2 * 4;  // per particle
 
   OutputArrays arrays() const {
     std::size_t at = 0;
     OutputArrays f{};
+    f.density = carve<float>(memory_, at, n_);
+    f.pressure = carve<float>(memory_, at, n_);
+    if (!all_) return f;
     f.fluid_id_sum = carve<long long>(memory_, at, n_);
     f.wall_id_sum = carve<long long>(memory_, at, n_);
     f.pressure_acceleration = carve<float>(memory_, at, 3 * n_);
@@ -61,8 +52,6 @@ class OutputBuffers {
     f.wall_pressure_acceleration = carve<float>(memory_, at, 3 * n_);
     f.wall_viscous_acceleration = carve<float>(memory_, at, 3 * n_);
     f.acceleration = carve<float>(memory_, at, 3 * n_);
-    f.density = carve<float>(memory_, at, n_);
-    f.pressure = carve<float>(memory_, at, n_);
     f.fluid_count = carve<int>(memory_, at, n_);
     f.wall_count = carve<int>(memory_, at, n_);
     return f;
@@ -75,6 +64,7 @@ class OutputBuffers {
   }
 
   std::size_t n_ = 0;
+  bool all_ = true;
   Buffer<char> memory_;
 };
 

@@ -48,7 +48,7 @@ class Solver : public DeviceSolver {
       in_use_ = Structures::none;
     }
     const DeviceStatus status = compute(poses, [&]<bool periodic>(std::bool_constant<periodic>) {
-      const OutputArrays fields = output_.unwritten(scene_.particles());
+      const OutputArrays fields = output_.unwritten(scene_.particles(), true);
       this->template compute_fields<periodic>(given, fields);
     });
     output_.download(out);
@@ -63,10 +63,10 @@ class Solver : public DeviceSolver {
     const DeviceStatus status = compute(poses, [&]<bool periodic>(std::bool_constant<periodic>) {
       const ParticleArrays a = arrays();
       find_neighbors<periodic>(a, {});
-      compute_density<periodic>(a, output_.unwritten_density(a.n));
+      compute_density<periodic>(a, output_.unwritten(a.n, false));
       search_.restore_state(stream_, a);
     });
-    output_.download_density(out);
+    output_.download(out);
     output_.clear();
     return status_of(status);
   }
