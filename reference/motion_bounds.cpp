@@ -6,13 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 namespace decant {
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// One component of a schedule between two keys.
 struct Cubic {

@@ -12,6 +12,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 #include <variant>
@@ -20,6 +21,7 @@
 namespace decant {
 
 using Vec3 = Eigen::Vector3d;
+inline constexpr double infinity = std::numeric_limits<double>::infinity();
 
 enum class KernelFamily { cubic_spline, wendland_c2, mueller2003 };
 /// As scenes and files name them.

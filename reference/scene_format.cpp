@@ -16,10 +16,10 @@ using nlohmann::ordered_json;
 
 constexpr Range positive{.low = 0.0, .high = 1e6, .low_open = true};
 constexpr Range non_negative{.low = 0.0, .high = 1e6};
-constexpr Range coordinate{.low = -1e4, .high = 1e4};  // m
-constexpr Range speed{.low = -1e4, .high = 1e4};       // m/s
-constexpr Range turns{.low = -1e6, .high = 1e6};       // rad or degrees; a double has 1e6 rad within 1e-10
-constexpr Range phase{.low = -1e3, .high = 1e3};       // rad
+constexpr Range coordinate{.low = -1e4, .high = 1e4};   // m
+constexpr Range speed{.low = -1e4, .high = 1e4};        // m/s
+constexpr Range turns{.low = -1e6, .high = 1e6};        // rad or degrees; a double has 1e6 rad within 1e-10
+constexpr Range phase_shift{.low = -1e3, .high = 1e3};  // rad
 
 ValueFormat number(const Range& range, std::string description) {
   return {NumberFormat{range}, std::move(description)};
@@ -212,7 +212,7 @@ ObjectFormat oscillation_object(std::string of, ValueFormat amplitude) {
           {
               required("amplitude", std::move(amplitude)),
               required("frequency", number(positive, "Hz")),
-              optional("phase", number(phase, "rad"), Oscillation<double>{}.phase),
+              optional("phase", number(phase_shift, "rad"), Oscillation<double>{}.phase),
           }};
 }
 

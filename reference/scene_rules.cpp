@@ -10,12 +10,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace decant {
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 const Container* container_of(const Scene& scene, const Fill& fill) {
   for (const auto& c : scene.containers)

@@ -13,29 +13,29 @@
 namespace decant {
 namespace {
 
-using json = nlohmann::ordered_json;
+using nlohmann::ordered_json;
 
 constexpr std::size_t line_width = 120;
 
 /// Whole numbers without a fraction.
-json plain(double value) {
+ordered_json plain(double value) {
   if (value == std::floor(value) && std::abs(value) < 1e15) return static_cast<std::int64_t>(value);
   return value;
 }
 
-json plain(const json& value) {
+ordered_json plain(const ordered_json& value) {
   if (value.is_number_float()) return plain(value.get<double>());
-  json out = value;
+  ordered_json out = value;
   if (value.is_array())
-    for (json& item : out) item = plain(json(item));
+    for (ordered_json& item : out) item = plain(ordered_json(item));
   return out;
 }
 
-json schema_of(const ValueFormat& value);
+ordered_json schema_of(const ValueFormat& value);
 
 /// Writes what a type says into the schema of a value.
 struct TypeWriter {
-  json& out;
+  ordered_json& out;
 
   void operator()(const NumberFormat& number) const {
     if (!number.only.empty()) {
@@ -77,23 +77,23 @@ struct TypeWriter {
   void operator()(const ObjectReference& object) const { out["$ref"] = "#/$defs/" + object.name; }
 };
 
-json schema_of(const ValueFormat& value) {
-  json out = json::object();
+ordered_json schema_of(const ValueFormat& value) {
+  ordered_json out = ordered_json::object();
   if (!value.description.empty()) out["description"] = value.description;
   std::visit(TypeWriter{out}, value.type);
   return out;
 }
 
 /// Adds to `out` what an object says but for its description.
-void write_object(const ObjectFormat& object, json& out) {
+void write_object(const ObjectFormat& object, ordered_json& out) {
   out["type"] = "object";
   out["additionalProperties"] = false;
-  json required = json::array();
+  ordered_json required = ordered_json::array();
   for (const Member& member : object.members)
     if (member.required) required.push_back(member.key);
   if (!required.empty()) out["required"] = required;
   for (const Member& member : object.members) {
-    json& property = out["properties"][member.key];
+    ordered_json& property = out["properties"][member.key];
     property = schema_of(member.value);
     if (!member.otherwise.is_null()) property["default"] = plain(member.otherwise);
   }
@@ -104,25 +104,26 @@ void write_object(const ObjectFormat& object, json& out) {
   }
 }
 
-std::string in_brackets(const json& value, const std::string& inside) {
+std::string in_brackets(const ordered_json& value, const std::string& inside) {
   return value.is_object() ? fmt::format("{{{}}}", inside) : fmt::format("[{}]", inside);
 }
 
-std::string on_one_line(const json& value) {
+std::string on_one_line(const ordered_json& value) {
   if (!value.is_structured()) return value.dump();
   std::string inside;
   for (const auto& [key, item] : value.items())
-    inside += (inside.empty() ? "" : ", ") + (value.is_object() ? json(key).dump() + ": " : "") + on_one_line(item);
+    inside +=
+        (inside.empty() ? "" : ", ") + (value.is_object() ? ordered_json(key).dump() + ": " : "") + on_one_line(item);
   return in_brackets(value, inside);
 }
 
 /// \param indent  columns before the line; \param taken  columns of it that are not the value's
-std::string laid_out(const json& value, std::size_t indent, std::size_t taken) {
+std::string laid_out(const ordered_json& value, std::size_t indent, std::size_t taken) {
   const std::string whole = on_one_line(value);
   if (!value.is_structured() || indent + taken + whole.size() <= line_width) return whole;
   std::string inside;
   for (const auto& [key, item] : value.items()) {
-    const std::string before = value.is_object() ? json(key).dump() + ": " : "";
+    const std::string before = value.is_object() ? ordered_json(key).dump() + ": " : "";
     inside += (inside.empty() ? "\n" : ",\n") + std::string(indent + 2, ' ') + before +
               laid_out(item, indent + 2, before.size() + 1);
   }
@@ -133,7 +134,7 @@ std::string laid_out(const json& value, std::size_t indent, std::size_t taken) {
 }  // namespace
 
 std::string scene_schema() {
-  json out;
+  ordered_json out;
   out["$schema"] = "https://json-schema.org/draft/2020-12/schema";
   out["title"] = "Decant scene";
   for (const ObjectFormat& object : scene_format())
@@ -141,7 +142,7 @@ std::string scene_schema() {
       out["description"] = object.description + " Generated from reference/scene_format.cpp, which the parser reads.";
       write_object(object, out);
     } else {
-      json& definition = out["$defs"][object.name];
+      ordered_json& definition = out["$defs"][object.name];
       definition["description"] = object.description;
       write_object(object, definition);
     }

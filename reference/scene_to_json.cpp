@@ -8,43 +8,43 @@
 namespace decant {
 namespace {
 
-using json = nlohmann::ordered_json;  // keeps the order of the format's description
+using nlohmann::ordered_json;  // keeps the order of the format's description
 
-json vector_json(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
+ordered_json vector_json(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
-json box_json(const SolidBox& box) { return {{"min", vector_json(box.min)}, {"max", vector_json(box.max)}}; }
+ordered_json box_json(const SolidBox& box) { return {{"min", vector_json(box.min)}, {"max", vector_json(box.max)}}; }
 
-json oscillation_json(json amplitude, double frequency, double phase) {
+ordered_json oscillation_json(ordered_json amplitude, double frequency, double phase) {
   return {{"amplitude", std::move(amplitude)}, {"frequency", frequency}, {"phase", phase}};
 }
 
 /// What older scenes lack stays away where it says nothing, so that their text keeps its bytes.
-json tilt_json(const Tilt& tilt) {
-  json keys = json::array();
+ordered_json tilt_json(const Tilt& tilt) {
+  ordered_json keys = ordered_json::array();
   for (const auto& key : tilt.keys) keys.push_back({{"time", key.time}, {"angle", key.angle}});
-  json out = {{"pivot", vector_json(tilt.pivot)}, {"axis", vector_json(tilt.axis)}, {"keys", keys}};
+  ordered_json out = {{"pivot", vector_json(tilt.pivot)}, {"axis", vector_json(tilt.axis)}, {"keys", keys}};
   if (tilt.rate != 0) out["rate"] = tilt.rate;
   if (const auto& o = tilt.oscillation) out["oscillation"] = oscillation_json(o->amplitude, o->frequency, o->phase);
   return out;
 }
 
-json translation_json(const Translation& translation) {
-  json keys = json::array();
+ordered_json translation_json(const Translation& translation) {
+  ordered_json keys = ordered_json::array();
   for (const auto& key : translation.keys) keys.push_back({{"time", key.time}, {"offset", vector_json(key.offset)}});
-  json out = {{"keys", keys}};
+  ordered_json out = {{"keys", keys}};
   if (!translation.velocity.isZero(0)) out["velocity"] = vector_json(translation.velocity);
   if (const auto& o = translation.oscillation)
     out["oscillation"] = oscillation_json(vector_json(o->amplitude), o->frequency, o->phase);
   return out;
 }
 
-json container_json(const Container& container) {
-  json out = {{"name", container.name}};
+ordered_json container_json(const Container& container) {
+  ordered_json out = {{"name", container.name}};
   if (const auto* revolved = std::get_if<RevolvedShape>(&container.shape)) {
     out["revolved"] = {{"profile", revolved->profile}, {"wall_thickness", container.wall_thickness}};
   } else {
     const auto& boxes = std::get<BoxShape>(container.shape);
-    json solid = json::array();
+    ordered_json solid = ordered_json::array();
     for (const auto& box : boxes.solid) solid.push_back(box_json(box));
     out["boxes"] = {{"cavity", box_json(boxes.cavity)}, {"solid", solid}, {"wall_thickness", container.wall_thickness}};
   }
@@ -55,11 +55,11 @@ json container_json(const Container& container) {
   return out;
 }
 
-json fill_json(const Fill& fill) {
-  json out = json::object();
+ordered_json fill_json(const Fill& fill) {
+  ordered_json out = ordered_json::object();
   if (!fill.container.empty()) out["container"] = fill.container;
   if (fill.round) {
-    json& round = out[fill.round->axis < 0 ? "ball" : "rod"];
+    ordered_json& round = out[fill.round->axis < 0 ? "ball" : "rod"];
     round = {{"center", vector_json(fill.round->center)}, {"radius", fill.round->radius}};
     if (fill.round->axis >= 0) {
       round["axis"] = std::string(1, "xyz"[fill.round->axis]);
@@ -70,7 +70,7 @@ json fill_json(const Fill& fill) {
   if (!fill.around.empty()) out["around"] = fill.around;
   out["velocity"] = vector_json(fill.velocity);
   if (!fill.velocity_gradient.isZero(0)) {
-    json matrix = json::array();
+    ordered_json matrix = ordered_json::array();
     for (Eigen::Index a = 0; a < 3; ++a) matrix.push_back(vector_json(fill.velocity_gradient.row(a).transpose()));
     out["velocity_gradient"] = {{"matrix", matrix}, {"about", vector_json(fill.gradient_about)}};
   }
@@ -80,7 +80,7 @@ json fill_json(const Fill& fill) {
 }  // namespace
 
 std::string scene_to_json(const Scene& scene) {
-  json out;
+  ordered_json out;
   out["decant_scene"] = 1;
   out["name"] = scene.name;
   out["particle_spacing"] = scene.particle_spacing;
@@ -92,7 +92,7 @@ std::string scene_to_json(const Scene& scene) {
                   {"eos_exponent", fluid.eos_exponent}, {"allow_tension", fluid.allow_tension},
                   {"viscosity", fluid.viscosity},       {"wall_viscosity", fluid.wall_viscosity}};
   out["gravity"] = vector_json(scene.gravity);
-  json periodic = json::array();
+  ordered_json periodic = ordered_json::array();
   for (std::size_t a = 0; a < 3; ++a)
     if (scene.domain.periodic[a]) periodic.push_back(std::string(1, "xyz"[a]));
   out["domain"] = {
@@ -102,11 +102,11 @@ std::string scene_to_json(const Scene& scene) {
                     {"restitution", scene.contact.restitution},
                     {"friction", scene.contact.friction}};
   out["wall_layers"] = scene.wall_layers;
-  out["containers"] = json::array();
+  out["containers"] = ordered_json::array();
   for (const auto& container : scene.containers) out["containers"].push_back(container_json(container));
-  out["fill"] = json::array();
+  out["fill"] = ordered_json::array();
   for (const auto& fill : scene.fills) out["fill"].push_back(fill_json(fill));
-  json& time = out["time"];
+  ordered_json& time = out["time"];
   time = {{"end", scene.schedule.end}, {"frames", scene.schedule.frames}, {"courant", scene.schedule.courant}};
   if (scene.schedule.substeps_per_frame != 0) time["substeps_per_frame"] = scene.schedule.substeps_per_frame;
   time["substeps_derived"] = scene.schedule.substeps_derived;

@@ -9,13 +9,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 namespace decant {
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// \param line  a point of the tilt's line, world
 double distance_to_line(const Tilt& tilt, const Vec3& line, const Vec3& world) {

@@ -7,10 +7,10 @@
 #include "gpu/backends.hpp"
 #include "oracle/solution/reference_backend.hpp"
 #include "reference/error.hpp"
+#include "tests/special_values.hpp"
 
 #include <gtest/gtest.h>
 
-#include <limits>
 #include <ostream>
 #include <utility>
 #include <vector>
@@ -18,7 +18,7 @@
 namespace decant {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::nan;
 
 struct Choice {
   std::string name;

@@ -3,6 +3,7 @@
 #include "oracle/files/fixture_file.hpp"
 #include "oracle/solution/digest.hpp"
 #include "tests/small_fixture.hpp"
+#include "tests/special_values.hpp"
 
 #include <cmath>
 #include <limits>
@@ -16,7 +17,7 @@ extern "C" const char* __lsan_default_suppressions() { return "leak:libhdf5"; }
 namespace decant {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::nan;
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
 class DamagedFixture : public FixtureFile {};

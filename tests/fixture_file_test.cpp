@@ -3,13 +3,12 @@
 #include "oracle/files/fixture_file.hpp"
 #include "oracle/solution/digest.hpp"
 #include "tests/small_fixture.hpp"
-
-#include <limits>
+#include "tests/special_values.hpp"
 
 namespace decant {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::nan;
 
 TEST_F(FixtureFile, EverythingComesBackBitwise) {
   const Fixture sent = small_fixture(), back = read_fixture(file_);

@@ -2,6 +2,7 @@
 /// Files appear whole or not at all, come back bitwise, and are never believed.
 #include "oracle/files/hdf5_io.hpp"
 #include "reference/error.hpp"
+#include "tests/file_bytes.hpp"
 #include "tests/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
@@ -32,10 +33,7 @@ class Hdf5Io : public testing::Test {
   test::TemporaryFolder folder_;
 };
 
-std::string bytes_of(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
+using test::bytes_of;
 
 Eigen::VectorXd awkward_values() {
   Eigen::VectorXd v(6);

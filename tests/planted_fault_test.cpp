@@ -7,6 +7,7 @@
 
 #include "reference/kernel.hpp"
 #include "reference/sampling.hpp"
+#include "tests/special_values.hpp"
 
 #include <gtest/gtest.h>
 
@@ -20,7 +21,7 @@ namespace {
 using test::Edit;
 using test::EditedReference;
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::nan;
 
 struct Fault {
   const char* name;

@@ -9,6 +9,7 @@
 #include "oracle/solution/reference_backend.hpp"
 #include "reference/error.hpp"
 #include "tests/falling_points.hpp"
+#include "tests/file_bytes.hpp"
 #include "tests/pour_arguments.hpp"
 #include "tools/commands/commands.hpp"
 #include "tools/frames/frame_file.hpp"
@@ -38,11 +39,7 @@ pour::Options quiet_options(const fs::path& out) {
   return options;
 }
 
-std::string bytes_of(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file).rdbuf();
-  return text.str();
-}
+using test::bytes_of;
 
 /// Compares files without printing them.
 ::testing::AssertionResult same_bytes(const fs::path& a, const fs::path& b) {

@@ -22,8 +22,6 @@ namespace fs = std::filesystem;
 using test::FallingPoints;
 using test::TemporaryFolder;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
 /// Falling points whose velocity changes by `kick` (m/s) at a substep.
 class Kicked : public FallingPoints {
  public:

@@ -8,6 +8,7 @@
 #include "reference/error.hpp"
 #include "reference/scene_file.hpp"
 #include "tests/falling_points.hpp"
+#include "tests/file_bytes.hpp"
 #include "tests/pour_arguments.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tools/commands/commands.hpp"
@@ -34,11 +35,7 @@ using test::FallingPoints;
 using test::pour_command;
 using test::TemporaryFolder;
 
-std::string bytes_of(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file).rdbuf();
-  return text.str();
-}
+using test::bytes_of;
 
 /// A child that ends with what `work` returns, or 2 and 3 as the command does.
 class Process {

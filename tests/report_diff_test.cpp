@@ -4,19 +4,19 @@
 #include "oracle/files/report_file.hpp"
 
 #include "reference/error.hpp"
+#include "reference/scene.hpp"
+#include "tests/special_values.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tools/commands/commands.hpp"
 
 #include <gtest/gtest.h>
 
-#include <limits>
 #include <sstream>
 
 namespace decant {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double infinity = std::numeric_limits<double>::infinity();
+using test::nan;
 
 CheckRow row(const std::string& check, double score, const std::string& backend = "brute") {
   CheckRow r;

@@ -5,6 +5,7 @@
 #include "oracle/files/report_file.hpp"
 #include "oracle/report/console_table.hpp"
 #include "reference/error.hpp"
+#include "tests/special_values.hpp"
 #include "tests/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
@@ -21,7 +22,7 @@ namespace decant {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::nan;
 
 CheckRow row(const std::string& backend, const std::string& fixture, const std::string& check, double score) {
   CheckRow r;

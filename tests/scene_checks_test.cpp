@@ -9,12 +9,12 @@
 #include "reference/scene_file.hpp"
 #include "reference/shapes.hpp"
 #include "reference/sweep.hpp"
+#include "tests/special_values.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <numbers>
 
 namespace decant {
@@ -61,7 +61,7 @@ struct Unsound {
 
 void PrintTo(const Unsound& scene, std::ostream* out) { *out << scene.what; }
 
-const double nan = std::numeric_limits<double>::quiet_NaN();
+using test::nan;
 
 const Unsound unsound[] = {
     {"SpacingNotANumber", pour, [](Scene& s) { s.particle_spacing = nan; }, "particle_spacing", "nan", "> 0"},

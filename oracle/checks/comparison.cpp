@@ -10,11 +10,7 @@
 #endif
 
 namespace decant {
-namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
-}  // namespace
+namespace {}  // namespace
 
 void compare(const Values& v, CheckRow& row) {
   const auto n = v.expected.size();

@@ -4,12 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace decant {
 namespace {
-
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// Compares where the field was answered, else leaves a row that did not run.
 void check_field(const char* check, const char* name, const char* unit, const Answered& answered, const Values& values,

@@ -10,13 +10,11 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
-#include <limits>
 #include <string>
 
 namespace decant {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr const char* axis_names = "xyz";
 
 /// How many reports of one kind were asked for, and what was wrong with the first that was.

@@ -37,7 +37,7 @@ struct BenchArguments {
   int substeps = 0, windows = 5, refine = 0;
 };
 
-constexpr const char* footer =
+constexpr const char* bench_footer =
     "Each window starts from the recorded state again, advances it by a frame to warm up, and then by\n"
     "--substeps, a frame's worth at a time as `pour` does. The median window counts. Where substeps\n"
     "are launched one by one stages are sampled and launch apart, so that their sum may exceed a substep\n"
@@ -278,7 +278,7 @@ int bench(BenchArguments& arguments) {
 void add_bench_command(CLI::App& app, int& exit_status) {
   auto arguments = std::make_shared<BenchArguments>();
   CLI::App* verb = app.add_subcommand("bench", "time per substep of backends that conform");
-  verb->footer(footer);
+  verb->footer(bench_footer);
   verb->add_option("FIXTURE", arguments->fixtures, "recordings (*.h5); default: the small ones");
   verb->add_option("--backend", arguments->backends,
                    "reference,reference:all-pairs,brute,…; default: all that the executor runs")

@@ -46,7 +46,7 @@ struct ConformArguments {
 // Of what a report shows around its first failing particle, in H.
 constexpr double shown_radius = 6;
 
-constexpr const char* footer =
+constexpr const char* conform_footer =
     "Without FIXTURE the small recordings beside the binary are judged (or those in the folder "
     "that\n"
     "DECANT_FIXTURES names), with --all every one. A check passes where no error exceeds its own\n"
@@ -388,7 +388,7 @@ int conform(ConformArguments& arguments) {
 void add_conform_command(CLI::App& app, int& exit_status) {
   auto arguments = std::make_shared<ConformArguments>();
   CLI::App* verb = app.add_subcommand("conform", "judge backends on recorded states");
-  verb->footer(footer);
+  verb->footer(conform_footer);
   verb->add_option("FIXTURE", arguments->fixtures, "recordings, by file or by name; default: the small ones");
   verb->add_flag("--all", arguments->all, "the study-scale recordings too");
   verb->add_option("-k,--select", arguments->select, "of the recordings those with this in their names");

@@ -26,7 +26,7 @@ struct DiffArguments {
   bool json = false, quiet = false;
 };
 
-constexpr const char* footer =
+constexpr const char* diff_footer =
     "Two reports: rows are the same where backend, options, executor, fixture, check and field are.\n"
     "Two pours of one scene (folders, or their frames.h5): distances frame by frame, positions in dx.\n"
     "Fluid is chaotic, so that right answers part too: further pours from perturbed starts\n"
@@ -153,7 +153,7 @@ int diff(const DiffArguments& arguments) {
 void add_diff_command(CLI::App& app, int& exit_status) {
   auto arguments = std::make_shared<DiffArguments>();
   CLI::App* verb = app.add_subcommand("diff", "tell two reports, or two pours, apart");
-  verb->footer(footer);
+  verb->footer(diff_footer);
   verb->add_option("BEFORE", arguments->before, "report (*.h5), or a pour's folder")->required();
   verb->add_option("AFTER", arguments->after, "another of the same kind")->required();
   verb->add_option("--spread", arguments->spread, "pours: more of them, from perturbed starts");

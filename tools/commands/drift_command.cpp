@@ -37,7 +37,7 @@ struct DriftArguments {
 
 constexpr int perturbed_pours = 4;
 
-constexpr const char* footer =
+constexpr const char* drift_footer =
     "From each state a window of substeps is run with lists that miss nothing. Along it, lists rebuilt\n"
     "every N substeps with a skin (a share of H) are compared pair by pair with all pairs, and what\n"
     "they miss is put into a double evaluation, so that errors below fp32's noise show. A recording\n"
@@ -252,7 +252,7 @@ void add_drift_command(CLI::App& app, int& exit_status) {
   verb.add_flag("--whole", arguments->whole)->group("");
   verb.add_flag("--untimed", arguments->untimed, "lists are compared, not run");
   verb.add_flag("--quiet", arguments->quiet, "no progress on standard error");
-  verb.footer(footer);
+  verb.footer(drift_footer);
   verb.callback([arguments, &exit_status] { run(*arguments, exit_status); });
 }
 

@@ -18,7 +18,7 @@ struct ExportArguments {
   std::string fixture, out;
 };
 
-constexpr const char* footer =
+constexpr const char* export_footer =
     "Writes the state, the scene's constants, wall particles as they stand and move, and inputs of\n"
     "the staged accelerations; the layout is in oracle/formats/results.md.\n"
     "\n"
@@ -42,7 +42,7 @@ int export_inputs(const ExportArguments& arguments) {
 void add_export_command(CLI::App& app, int& exit_status) {
   auto arguments = std::make_shared<ExportArguments>();
   CLI::App* verb = app.add_subcommand("export", "write what a foreign port needs of a fixture");
-  verb->footer(footer);
+  verb->footer(export_footer);
   verb->add_option("FIXTURE", arguments->fixture, "recording (*.h5)")->required();
   verb->add_option("--out", arguments->out, "file to write")->required();
   verb->callback([arguments, &exit_status] { exit_status = export_inputs(*arguments); });

@@ -31,7 +31,7 @@ struct PourArguments {
   bool csv = false, resume = false, quiet = false, json = false;
 };
 
-constexpr const char* footer =
+constexpr const char* pour_footer =
     "Ctrl-C stops within a second, inside a frame too, and leaves a checkpoint; the same command with\n"
     "--resume goes on and ends in the same bits. A second Ctrl-C ends at once; the checkpoint before it\n"
     "still holds.\n"
@@ -119,7 +119,7 @@ void add_pour_command(CLI::App& app, int& exit_status) {
   command->add_flag("--resume", a->resume, "Go on from the folder's last checkpoint");
   command->add_flag("--quiet", a->quiet, "Say nothing but errors");
   command->add_flag("--json", a->json, "Print the summary as JSON");
-  command->footer(footer);
+  command->footer(pour_footer);
   command->callback([a, &exit_status] { exit_status = run(*a); });
 }
 

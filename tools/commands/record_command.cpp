@@ -39,7 +39,7 @@ struct RecordArguments {
   bool sample = false, quiet = false;
 };
 
-constexpr const char* footer =
+constexpr const char* record_footer =
     "Phases: start, settled, tilt-onset, stream, splash, filling, rest, at times that follow from "
     "the\n"
     "scene's tilt, or NAME=TIME (s). Several phases, or none, with {phase} in --out: one file "
@@ -259,7 +259,7 @@ int record(const RecordArguments& arguments) {
 void add_record_command(CLI::App& app, int& exit_status) {
   auto arguments = std::make_shared<RecordArguments>();
   CLI::App* verb = app.add_subcommand("record", "run a scene and write fixtures");
-  verb->footer(footer);
+  verb->footer(record_footer);
   verb->add_option("SCENE", arguments->scene, "scene file (*.json)")->required();
   verb->add_option("--out", arguments->out, "file to write; {phase} in it becomes the phase's name")->required();
   verb->add_option("--phase", arguments->phases, "NAME or NAME=TIME (s); may be repeated")->allow_extra_args(false);

@@ -29,7 +29,7 @@ struct ValidateArguments {
   bool list = false, quick = false, quiet = false;
 };
 
-constexpr const char* footer =
+constexpr const char* validate_footer =
     "Without arguments every case runs at the resolutions that its executor affords: all of them on a\n"
     "GPU, the coarser ones on the host. --quick is the part that takes minutes on two cores. A gate that\n"
     "is not met stays in the table with its figure; nothing is loosened. Any backend can be validated,\n"
@@ -155,7 +155,7 @@ void add_validate_command(CLI::App& app, int& exit_status) {
   verb.add_option("--report", arguments->report, "HDF5 file for figures and curves");
   verb.add_flag("--quiet", arguments->quiet, "no progress on standard error");
   arguments->flags.add_to(verb);
-  verb.footer(footer);
+  verb.footer(validate_footer);
   verb.callback([arguments, &exit_status] { run(*arguments, exit_status); });
 }
 

@@ -15,14 +15,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <set>
 
 namespace decant::pour {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr std::size_t elsewhere = 4;  // of compared_fields
 
 struct FrameValues {
