@@ -21,6 +21,8 @@ function(decant_add_backends NAME FOLDER HAS_CUDA)
   endif()
 
   add_library(${NAME} OBJECT ${host_sources} ${cuda_sources})
+  # A backend is a translation unit; newer CMakes would put several into one.
+  set_target_properties(${NAME} PROPERTIES UNITY_BUILD OFF)
   target_compile_definitions(${NAME} PRIVATE DECANT_HAS_CUDA=${HAS_CUDA})
   if(DECANT_SANITIZE)
     # Thrust's sorting binds references to null tags, which it never reads; AddressSanitizer still sees

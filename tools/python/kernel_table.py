@@ -7,7 +7,7 @@ import re
 
 from one_line import need_file, refuse, run_main
 
-COLUMNS = [  # heading, metric, scale
+COLUMNS = [  # heading, metric or two whose quotient it is, scale
     ("us", "gpu__time_duration.sum", 1e-3),
     ("registers", "launch__registers_per_thread", 1),
     ("occupancy %", "sm__warps_active.avg.pct_of_peak_sustained_active", 1),
@@ -16,12 +16,21 @@ COLUMNS = [  # heading, metric, scale
     ("lanes of 32", "smsp__thread_inst_executed_per_inst_executed.ratio", 1),
     ("L1 hit %", "l1tex__t_sector_hit_rate.pct", 1),
     ("M L2 sectors", "lts__t_sectors.sum", 1e-6),
+    ("DRAM MB", "dram__bytes.sum", 1e-6),
+    ("waves/shared", ("l1tex__data_pipe_lsu_wavefronts_mem_shared.sum", "smsp__sass_inst_executed_op_shared.sum"), 1),
 ]
 
 
 def short(name):
-    name = re.sub(r"decant::|gpu::cuda::|void |\(int\)|\(bool\)", "", name)
+    name = re.sub(r"decant::|gpu::|cuda::|unnamed>::|void |\(int\)|\(bool\)", "", name)
     return re.sub(r"\(.*", "", name)[:66]
+
+
+def figure(header, row, metric):
+    if isinstance(metric, tuple):
+        above, below = (figure(header, row, part) for part in metric)
+        return above / below if below else 0.0
+    return float(row[header.index(metric)].replace(",", ""))
 
 
 def last_of_each(path):
@@ -33,8 +42,7 @@ def last_of_each(path):
                 header = row
             elif header and len(row) == len(header) and row[header.index("ID")].isdigit():
                 name = short(row[header.index("Kernel Name")])
-                last[name] = [float(row[header.index(metric)].replace(",", "")) * scale
-                              for _, metric, scale in COLUMNS]
+                last[name] = [figure(header, row, metric) * scale for _, metric, scale in COLUMNS]
     return last
 
 
