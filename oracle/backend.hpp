@@ -59,10 +59,28 @@ struct NeighborStats {
   PairTotals verified;                   // of lists that verify themselves, since `load`
 };
 
+/// What a backend can be asked for, or'ed; the bits of decant_offer (oracle/plugin.h). Checks of what is not offered
+/// are not_run.
+namespace Offer {
+enum Bit : std::uint32_t {
+  density = 1,       // and pressure
+  acceleration = 2,  // the sum
+  parts = 4,         // of it
+  neighbors = 8,
+  given = 16,  // StageInputs
+  boundary_volume = 32,
+  walls = 64,  // scenes with wall particles
+  step = 128,  // advance and read
+  status = 256,
+  all = 511
+};
+}  // namespace Offer
+
 class Backend {
  public:
   virtual ~Backend() = default;
   virtual BackendInfo info() const = 0;
+  virtual std::uint32_t offers() const { return Offer::all; }
   /// Takes scene, wall particles and state; may allocate. May be called again.
   virtual void load(const Scene&, const Walls&, const ParticleState&) = 0;
   /// Fields at the state, after `advance` from what its next substep would use; no later run changes by it. `out`

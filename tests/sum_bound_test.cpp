@@ -12,13 +12,13 @@
 namespace decant {
 namespace {
 
-constexpr double u = 0x1p-24;
+constexpr double fp32_roundoff = 0x1p-24;
 
 double bound(const std::vector<float>& terms, double inside = 0) {
   SumBound sum;
   for (const float t : terms) sum.add(static_cast<double>(t));
   CellCounter cells;
-  return sum.error(u, inside, cells);
+  return sum.error(fp32_roundoff, inside, cells);
 }
 
 double exact(const std::vector<float>& terms) {
@@ -41,7 +41,7 @@ TEST(SumBound, OfOneTermIsWhatIsInsideIt) {
 }
 
 TEST(SumBound, OfTwoTermsIsOneRounding) {
-  EXPECT_EQ(bound({3.0f, -1.0f}), u * 4);
+  EXPECT_EQ(bound({3.0f, -1.0f}), fp32_roundoff * 4);
   EXPECT_EQ(bound({1.0f, 0x1p-30f}), 0x1p-30) << "it is lost at most";
 }
 
@@ -51,9 +51,9 @@ TEST(SumBound, GrowsWithTheNumberOfTermsThatRoundAlike) {
   std::vector<float> terms(400, t);
   terms.insert(terms.begin(), 9.81f);
   const double size = exact(terms);
-  EXPECT_GT(error(terms), 3 * std::sqrt(400.0) * u * size) << "√n is not enough";
+  EXPECT_GT(error(terms), 3 * std::sqrt(400.0) * fp32_roundoff * size) << "√n is not enough";
   EXPECT_LE(error(terms), bound(terms));
-  EXPECT_LE(bound(terms), 400 * u * size * (1 + 1e-9));
+  EXPECT_LE(bound(terms), 400 * fp32_roundoff * size * (1 + 1e-9));
 }
 
 TEST(SumBound, OfDifferentTermsGrowsAsTheRootOfTheirNumber) {
@@ -61,10 +61,10 @@ TEST(SumBound, OfDifferentTermsGrowsAsTheRootOfTheirNumber) {
   std::vector<float> terms;
   for (int k = 0; k < 500; ++k) terms.push_back(std::uniform_real_distribution<float>(1, 2)(random));
   const double size = exact(terms);
-  EXPECT_LT(bound(terms), 3 * std::sqrt(1000.0) * u * size);
-  EXPECT_GE(bound(terms), 3 * std::sqrt(500.0) * u * size * (1 - 1e-9));
+  EXPECT_LT(bound(terms), 3 * std::sqrt(1000.0) * fp32_roundoff * size);
+  EXPECT_GE(bound(terms), 3 * std::sqrt(500.0) * fp32_roundoff * size * (1 - 1e-9));
   // A worst case inside terms takes the place of what is rare in their order.
-  EXPECT_DOUBLE_EQ(bound(terms, 500 * u * size), bound(terms) / 3 + 500 * u * size);
+  EXPECT_DOUBLE_EQ(bound(terms, 500 * fp32_roundoff * size), bound(terms) / 3 + 500 * fp32_roundoff * size);
 }
 
 /// Whatever the terms, and whatever the order: by size, up and down, at random, in pairs.
@@ -99,7 +99,7 @@ TEST(SumBound, IsExceededByNoOrder) {
       }
       // To first order in u: a partial sum is off by as much as it is rounded.
       if (off > 0) worst = std::max(worst, off / tau);
-      ASSERT_LE(off, tau * (1 + 61 * u)) << "case " << k << " order " << order;
+      ASSERT_LE(off, tau * (1 + 61 * fp32_roundoff)) << "case " << k << " order " << order;
     }
   }
   EXPECT_GT(worst, 0.5) << "a bound that is never approached is too loose";

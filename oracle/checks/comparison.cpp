@@ -98,6 +98,8 @@ CheckRow& RowBuilder::row(const char* check, const std::string& field, const cha
   return row;
 }
 
+void RowBuilder::not_run(const char* check, const std::string& why) { row(check, "all", "").reason = why; }
+
 void RowBuilder::failed(const char* check, const std::string& why) {
   CheckRow& r = row(check, "all", "");
   r.verdict = Verdict::fail;

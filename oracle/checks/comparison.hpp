@@ -47,6 +47,8 @@ class RowBuilder {
   CheckRow& row(const char* check, const std::string& field, const char* unit);
   /// A check of which nothing could be compared.
   void failed(const char* check, const std::string& why);
+  /// A check that was left out.
+  void not_run(const char* check, const std::string& why);
   std::vector<CheckRow> take() { return std::move(rows_); }
 
  private:

@@ -89,6 +89,23 @@ const Answered& all_answered() {
   return all;
 }
 
+Answered answered_by(std::uint32_t offers) {
+  Answered names;
+  const auto add = [&](std::uint32_t bit, std::initializer_list<const char*> fields) {
+    if (offers & bit) names.insert(fields.begin(), fields.end());
+  };
+  add(Offer::boundary_volume, {"boundary_volume"});
+  add(Offer::density, {"density", "pressure"});
+  add(Offer::acceleration, {"acceleration"});
+  if (offers & Offer::parts)
+    for (const auto& field : acceleration_fields)
+      if (field.member != &Fields::acceleration) names.insert(field.name);
+  if (offers & Offer::neighbors)
+    for (const auto& fact : neighbor_facts) names.insert(fact.name);
+  add(Offer::step, {"position", "velocity"});
+  return names;
+}
+
 void check_stages(const Fields& got, const Answered& answered, const PreparedReference& oracle, RowBuilder& builder) {
   const ReferenceSolution& own = oracle.own;
   for (const NeighborFact& fact : neighbor_facts) {

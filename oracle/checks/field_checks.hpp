@@ -54,6 +54,9 @@ using Answered = std::set<std::string>;
 /// What a backend that was run has answered: everything.
 const Answered& all_answered();
 
+/// The fields among what is offered (Offer).
+Answered answered_by(std::uint32_t offers);
+
 /// Reason of a row that nobody answered.
 inline constexpr const char* not_given = "not given";
 

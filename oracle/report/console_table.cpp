@@ -16,7 +16,9 @@ constexpr std::size_t widest = 100;  // columns
 /// One backend on one fixture, over all its rows.
 struct Line {
   std::string backend, fixture;
-  Verdict verdict = Verdict::pass;
+  Verdict verdict = Verdict::not_run;  // of what the backend offers
+  bool begun = false;
+  std::set<std::string> left_out = {};  // checks of what it does not offer
   const CheckRow* worst = nullptr;
   const CheckRow* first_stage = nullptr;  // that fails, in the order in which fields follow from each other
 };
@@ -59,7 +61,12 @@ std::vector<Line> lines_of(const std::vector<CheckRow>& rows) {
       lines.push_back({backend, row.fixture});
       line = lines.end() - 1;
     }
-    line->verdict = combined(line->verdict, verdict_of(row));
+    if (row.verdict == Verdict::not_run && row.reason == not_offered) {
+      line->left_out.insert(row.check);
+      continue;
+    }
+    line->verdict = line->begun ? combined(line->verdict, verdict_of(row)) : verdict_of(row);
+    line->begun = true;
     if (!line->first_stage && is_stage(row) && verdict_of(row) == Verdict::fail) line->first_stage = &row;
     if (row.verdict != Verdict::not_run && (!line->worst || worse(row, *line->worst))) line->worst = &row;
   }
@@ -195,7 +202,13 @@ std::string console_table(const Report& report) {
                     line.worst ? fmt::format("{:.3g}", line.worst->score) : "-", fitted(check_of(line), check_width));
   std::string rest;
   for (const auto& row : report.rows)
-    if (verdict_of(row) != Verdict::pass) rest += in_full(row);
+    if (verdict_of(row) != Verdict::pass && row.reason != not_offered) rest += in_full(row);
+  std::set<std::string> left_out;
+  for (const auto& line : lines)
+    if (!line.left_out.empty())
+      left_out.insert(
+          fmt::format("{} does not offer what these need: {}\n", line.backend, fmt::join(line.left_out, ", ")));
+  for (const auto& text_of_one : left_out) rest += text_of_one;
   if (!rest.empty()) text += "\n" + rest;
   return text + "\n" + verdict_line(report) + "\n";
 }

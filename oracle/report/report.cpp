@@ -68,12 +68,14 @@ void condense(CheckRow& row) {
 }
 
 int exit_status(const Report& report) {
-  bool fails = false, missing = report.rows.empty();
+  bool fails = false, missing = false, judged = false;
   for (const auto& row : report.rows) {
     const Verdict verdict = verdict_of(row);
     fails |= verdict == Verdict::fail;
-    missing |= verdict == Verdict::not_run;
+    missing |= verdict == Verdict::not_run && row.reason != not_offered;
+    judged |= verdict != Verdict::not_run;
   }
+  missing |= !judged;
   return fails ? 1 : missing ? 3 : 0;
 }
 

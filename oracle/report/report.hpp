@@ -23,6 +23,9 @@ enum class Verdict : std::uint8_t { pass, fail, not_run };
 /// "pass", "fail" or "not_run".
 const char* to_string(Verdict verdict);
 
+/// Reason of a row about something that a backend does not offer: its other rows decide.
+inline constexpr const char* not_offered = "not offered";
+
 inline constexpr double no_number = std::numeric_limits<double>::quiet_NaN();
 
 /// One line of /summary: one field of one check of one backend on one fixture.

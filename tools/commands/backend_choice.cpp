@@ -4,6 +4,7 @@
 
 #include "gpu/backends.hpp"
 #include "gpu/options.hpp"
+#include "oracle/plugin/plugin_backend.hpp"
 #include "oracle/solution/reference_backend.hpp"
 
 #include <fmt/format.h>
@@ -74,9 +75,13 @@ std::unique_ptr<Backend> choose_backend(const std::string& choice, const std::st
   const auto colon = choice.find(':');
   const std::string name = choice.substr(0, colon);
   const std::string options = colon == std::string::npos ? "" : choice.substr(colon + 1);
+  if (name == "plugin") {
+    if (executor != "auto") refuse("--executor", executor, "a plug-in runs on what it is built for");
+    return make_plugin_backend(options);
+  }
   const auto choices = backend_choices();
   if (std::find(choices.begin(), choices.end(), name) == choices.end())
-    refuse("--backend", name, fmt::format("must be one of {}", fmt::join(choices, ", ")));
+    refuse("--backend", name, fmt::format("must be one of {}, plugin:PATH", fmt::join(choices, ", ")));
   if (name != "reference") return make_backend(name, executor_of(executor), options);
   if (executor == "cuda") refuse("--executor", executor, "the reference runs on the host only");
   if (executor != "auto" && executor != "host") (void)executor_of(executor);

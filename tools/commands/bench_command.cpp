@@ -281,7 +281,7 @@ void add_bench_command(CLI::App& app, int& exit_status) {
   verb->footer(bench_footer);
   verb->add_option("FIXTURE", arguments->fixtures, "recordings (*.h5); default: the small ones");
   verb->add_option("--backend", arguments->backends,
-                   "reference,reference:all-pairs,brute,…; default: all that the executor runs")
+                   "reference,reference:all-pairs,brute,…, plugin:PATH; default: all that the executor runs")
       ->delimiter(',')
       ->allow_extra_args(false);
   verb->add_option("--executor", arguments->executor, "auto, cuda or host")->capture_default_str();
