@@ -6,14 +6,18 @@
 #include "oracle/files/fixture_file.hpp"
 #include "oracle/plugin/plugin_backend.hpp"
 #include "oracle/report/console_table.hpp"
-#include "oracle/solution/reference_backend.hpp"
 #include "reference/error.hpp"
 #include "reference/sampling.hpp"
+#include "tests/temporary_folder.hpp"
 #include "tools/commands/backend_choice.hpp"
+#include "tools/fuzz/campaign.hpp"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstddef>
+#include <filesystem>
+#include <map>
 #include <memory>
 #include <ostream>
 #include <set>
@@ -96,6 +100,20 @@ TEST(Plugin, WithoutAStateSaysSo) {
   EXPECT_THROW(backend->read(state), BackendError);
 }
 
+TEST(Plugin, ThatCrashesInOneCheckIsAskedTheOthers) {
+  const auto backend = plugin_called("faulty", ":fault=crash");
+  std::map<std::string, Verdict> worst;
+  for (const CheckRow& row : judged(*backend, all_checks())) {
+    auto& verdict = worst.emplace(row.check, Verdict::pass).first->second;
+    if (verdict_of(row) == Verdict::fail) verdict = Verdict::fail;
+  }
+  for (const auto* check : {"density", "evaluation", "acceleration"})
+    EXPECT_EQ(worst.at(check), Verdict::pass) << check;
+  for (const auto* check : {"run", "substep", "contact", "advanced", "trajectory", "mass", "containment", "determinism",
+                            "conservation", "invariance", "status"})
+    EXPECT_EQ(worst.at(check), Verdict::fail) << check;
+}
+
 struct Fault {
   const char* name;
   const char* check;   // that fails
@@ -113,6 +131,8 @@ TEST_P(FaultyPlugin, IsARowThatSaysWhatHappened) {
   for (const CheckRow& row : rows)
     found |= row.check == check && verdict_of(row) == Verdict::fail && row.reason.find(reason) != std::string::npos;
   EXPECT_TRUE(found) << console_table({rows, {}});
+  EXPECT_TRUE(std::ranges::any_of(
+      rows, [&](const CheckRow& row) { return row.check == "density" || row.check == "evaluation"; }));
   // And the next state finds a plug-in that works, until it fails again.
   EXPECT_NO_THROW(backend->load(bowl().scene, prepared_bowl().walls, bowl().state));
 }
@@ -180,6 +200,36 @@ TEST(Plugin, ThatIsNoneIsRefusedInWords) {
   for (const char* limit : {"0", "-1", "", "x", "1e9", "nan"})
     EXPECT_NE(message_of(plugin_file("all_pairs") + ":time_limit=" + limit).find("time_limit is in"), std::string::npos)
         << limit;
+}
+
+TEST(Plugin, ThatCrashesDoesNotEndACampaign) {
+  const test::TemporaryFolder folder;
+  fuzz::Settings settings;
+  const std::string sound = "plugin:" + plugin_file("all_pairs");
+  const std::string crashing = "plugin:" + plugin_file("faulty") + ":fault=crash";
+  settings.backends = {sound, crashing};
+  settings.properties = {"substep"};
+  settings.cases = 6;
+  settings.threads = 2;
+  settings.minimise_tries = 0;
+  settings.failures = folder.path() / "failing";
+  const fuzz::Campaign campaign =
+      fuzz::run_campaign(settings, [](const std::string& choice) { return choose_backend(choice, "auto"); });
+  EXPECT_EQ(campaign.cases, 6);
+  std::int64_t asked = 0, failed = 0;
+  for (const fuzz::PropertyStatistics& statistics : campaign.statistics) {
+    EXPECT_TRUE(statistics.backend != sound || statistics.failed == 0);
+    asked += statistics.backend == crashing ? statistics.asked : 0;
+    failed += statistics.backend == crashing ? statistics.failed : 0;
+  }
+  EXPECT_GT(failed, 1);
+  EXPECT_EQ(failed, asked);
+  ASSERT_FALSE(campaign.counterexamples.empty());
+  for (const fuzz::Counterexample& found : campaign.counterexamples) {
+    EXPECT_NE(found.outcome.reason.find("ended by signal 6"), std::string::npos) << found.outcome.reason;
+    EXPECT_EQ(std::filesystem::path(found.file).parent_path(), settings.failures);
+    EXPECT_NO_THROW((void)read_fixture(found.file));
+  }
 }
 
 TEST(Plugin, IsChosenLikeABackend) {

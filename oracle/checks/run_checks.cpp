@@ -245,36 +245,34 @@ void check_invariance(Backend& backend, const PreparedReference& oracle, RowBuil
 
 }  // namespace
 
-void check_runs(Backend& backend, const Fixture& fixture, const PreparedReference& oracle, const CheckSelection& checks,
+void check_runs(Backend& backend, const Fixture& fixture, const PreparedReference& oracle, const Asking& asking,
                 RowBuilder& builder) {
-  const auto wanted = [&](const char* name) { return checks.count(name) > 0; };
-  const bool runs =
-      wanted("advanced") || wanted("trajectory") || wanted("mass") || wanted("containment") || wanted("determinism");
-  if (runs && !oracle.segments.empty()) {
-    const Run r = run(backend, fixture, oracle, oracle.segments.size());
+  Run r;
+  const auto all = {"advanced", "trajectory", "mass", "containment", "determinism"};
+  if (!oracle.segments.empty() && asking(all, [&] { r = run(backend, fixture, oracle, oracle.segments.size()); })) {
     const bool whole = r.end.position.cols() == fixture.state.size() && r.end.velocity.cols() == fixture.state.size();
-    for (const char* name : {"advanced", "trajectory", "mass", "containment", "determinism"}) {
-      if (!checks.count(name)) continue;
-      if (!r.status.ok()) {
-        builder.failed(name, describe(r.status));
-      } else if (!whole) {
-        builder.failed(name, fmt::format("{} positions and {} velocities, not {}", r.end.position.cols(),
-                                         r.end.velocity.cols(), fixture.state.size()));
-      } else if (name == std::string("advanced")) {
-        check_advanced(r.views, fixture, oracle.walls, oracle.volumes, builder);
-      } else if (name == std::string("trajectory")) {
-        check_trajectory(r, fixture, oracle, builder);
-      } else if (name == std::string("mass")) {
-        check_mass(r, fixture, oracle, builder);
-      } else if (name == std::string("containment")) {
-        check_containment(r, fixture.scene, oracle, builder);
-      } else {
-        check_determinism(backend, fixture, oracle, r, builder);
-      }
-    }
+    for (const char* name : all)
+      asking({name}, [&] {
+        if (!r.status.ok()) {
+          builder.failed(name, describe(r.status));
+        } else if (!whole) {
+          builder.failed(name, fmt::format("{} positions and {} velocities, not {}", r.end.position.cols(),
+                                           r.end.velocity.cols(), fixture.state.size()));
+        } else if (name == std::string("advanced")) {
+          check_advanced(r.views, fixture, oracle.walls, oracle.volumes, builder);
+        } else if (name == std::string("trajectory")) {
+          check_trajectory(r, fixture, oracle, builder);
+        } else if (name == std::string("mass")) {
+          check_mass(r, fixture, oracle, builder);
+        } else if (name == std::string("containment")) {
+          check_containment(r, fixture.scene, oracle, builder);
+        } else {
+          check_determinism(backend, fixture, oracle, r, builder);
+        }
+      });
   }
-  if (wanted("conservation")) check_conservation(backend, fixture, oracle, builder);
-  if (wanted("invariance")) check_invariance(backend, oracle, builder);
+  asking({"conservation"}, [&] { check_conservation(backend, fixture, oracle, builder); });
+  asking({"invariance"}, [&] { check_invariance(backend, oracle, builder); });
 }
 
 }  // namespace decant

@@ -7,10 +7,17 @@
 #include "oracle/checks/comparison.hpp"
 #include "oracle/checks/conform.hpp"
 
+#include <functional>
+#include <initializer_list>
+
 namespace decant {
 
-/// Makes the chosen ones of these checks, each from a fresh load.
-void check_runs(Backend& backend, const Fixture& fixture, const PreparedReference& oracle, const CheckSelection& checks,
+/// asking(checks, question): asks unless none of these checks is wanted. A question that throws is a row that fails of
+/// each of them, and false.
+using Asking = std::function<bool(std::initializer_list<const char*> checks, const std::function<void()>& question)>;
+
+/// Makes these checks as far as wanted, each from a fresh load.
+void check_runs(Backend& backend, const Fixture& fixture, const PreparedReference& oracle, const Asking& asking,
                 RowBuilder& builder);
 
 }  // namespace decant

@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cctype>
 #include <chrono>
 #include <cmath>
 #include <exception>
@@ -157,8 +158,9 @@ std::string write_case(const std::filesystem::path& folder, const Case& fuzz_cas
 
 std::string write_counterexample(const std::filesystem::path& folder, const Counterexample& counterexample) {
   std::string backend = counterexample.outcome.backend;
-  for (char& c : backend)
-    if (c == ':' || c == '=') c = '-';
+  // Of a plug-in the library, not where it lies.
+  if (const auto slash = backend.rfind('/'); slash != std::string::npos) backend.replace(0, slash + 1, "plugin-");
+  std::ranges::replace_if(backend, [](unsigned char c) { return !std::isalnum(c) && c != '.' && c != '_'; }, '-');
   return write_case(folder, counterexample.fuzz_case,
                     fmt::format("fuzz-{}-{}-{}", counterexample.seed, backend, counterexample.outcome.property),
                     {{"fuzz_seed", fmt::format("{}", counterexample.seed)},
