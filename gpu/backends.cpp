@@ -39,13 +39,13 @@ std::vector<float> rows_of(const Eigen::Matrix3Xd& m) {
   return {rows.data(), rows.data() + rows.size()};
 }
 
+Eigen::Matrix3Xd matrix_of(std::span<const float> rows) {
+  return Eigen::Map<const FloatRows>(rows.data(), 3, static_cast<Eigen::Index>(rows.size() / 3)).cast<double>();
+}
+
 std::vector<float> values_of(const Eigen::VectorXd& v) {
   const Eigen::VectorXf values = v.cast<float>();
   return {values.data(), values.data() + values.size()};
-}
-
-Eigen::Matrix3Xd matrix_of(std::span<const float> rows) {
-  return Eigen::Map<const FloatRows>(rows.data(), 3, static_cast<Eigen::Index>(rows.size() / 3)).cast<double>();
 }
 
 Eigen::VectorXd vector_of(const std::vector<float>& values) {

@@ -6,6 +6,7 @@
 #include "oracle/files/hdf5_io.hpp"
 #include "reference/error.hpp"
 #include "tests/falling_points.hpp"
+#include "tests/file_bytes.hpp"
 #include "tests/temporary_folder.hpp"
 #include "tools/frames/csv_writer.hpp"
 #include "tools/frames/make_frame.hpp"
@@ -44,11 +45,7 @@ frames::Frame awkward_frame(const Scene& scene, const frames::Layout& layout, st
   return frame;
 }
 
-std::string text_of(const std::filesystem::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file).rdbuf();
-  return text.str();
-}
+using test::bytes_of;
 
 std::vector<std::vector<std::string>> csv_rows(const std::filesystem::path& file) {
   std::vector<std::vector<std::string>> rows;
@@ -123,7 +120,7 @@ TEST(FrameFile, CallsAFrameWrittenOnlyWhenItIsComplete) {
   file.complete(frame);
   EXPECT_EQ(Hdf5Reader(folder / "f.h5").vector("/time", 4)[1], frame.time);
   frames::File::create(folder / "whole.h5", scene, layout, {}).write(frame);
-  EXPECT_TRUE(text_of(folder / "f.h5") == text_of(folder / "whole.h5"));
+  EXPECT_TRUE(bytes_of(folder / "f.h5") == bytes_of(folder / "whole.h5"));
 }
 
 TEST(FrameFile, KeepsASecondPourOut) {
@@ -156,7 +153,7 @@ TEST(FrameFile, IsTheSameFileForTheSameFrames) {
   const frames::Frame frame = awkward_frame(scene, layout, 0);
   for (const char* name : {"a.h5", "b.h5"})
     frames::File::create(folder / name, scene, layout, {{"backend", "hash"}}).write(frame);
-  EXPECT_TRUE(text_of(folder / "a.h5") == text_of(folder / "b.h5"));
+  EXPECT_TRUE(bytes_of(folder / "a.h5") == bytes_of(folder / "b.h5"));
 }
 
 TEST(FrameFile, TakesAsManyBytesAsForetold) {

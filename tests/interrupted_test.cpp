@@ -7,6 +7,7 @@
 #include "oracle/files/file_aside.hpp"
 #include "oracle/files/hdf5_io.hpp"
 #include "oracle/report/report.hpp"
+#include "tests/file_bytes.hpp"
 #include "tools/commands/commands.hpp"
 
 #include <gtest/gtest.h>
@@ -26,11 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 using test::TemporaryFolder;
 
-std::string text_of(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file).rdbuf();
-  return text.str();
-}
+using test::bytes_of;
 
 /// What becomes of `work`, in a child, that gets the signal as soon as it has said something on `heard`.
 struct Interrupted {
@@ -62,7 +59,7 @@ Interrupted interrupted(const TemporaryFolder& folder, int number, const std::fu
   EXPECT_EQ(::waitpid(child, &status, 0), child);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   result.status = WIFSIGNALED(status) ? -WTERMSIG(status) : WEXITSTATUS(status);
-  result.out = text_of(out);
+  result.out = bytes_of(out);
   // What takes longer than the test is patient for must not have been waited for.
   EXPECT_LT(result.seconds, 5.0);
   return result;
@@ -97,7 +94,7 @@ TEST(Interruptible, GivesUpThePartUnderWayAndHandsOverThoseBefore) {
     });
     EXPECT_EQ(end.status, 128 + number);
     EXPECT_LT(end.seconds, 1.0);
-    EXPECT_EQ(text_of(kept), "interrupted: 2 of 9 done");
+    EXPECT_EQ(bytes_of(kept), "interrupted: 2 of 9 done");
   }
 }
 
@@ -116,7 +113,7 @@ TEST(Interruptible, DoesNotBeginAnotherPart) {
   });
   EXPECT_EQ(end.status, 128 + SIGINT);
   EXPECT_LT(end.seconds, 1.0);
-  EXPECT_NE(text_of(kept).find(" of 1000 done"), std::string::npos);
+  EXPECT_NE(bytes_of(kept).find(" of 1000 done"), std::string::npos);
 }
 
 TEST(Interruptible, ThatIsNotInterruptedConcludesNothingByItself) {
@@ -152,7 +149,7 @@ TEST(InterruptedCommand, ConformKeepsTableReportAndJUnit) {
   EXPECT_EQ(kept.rows.front().fixture, "hostile-one-particle");
   EXPECT_NE(kept.provenance.at("interrupted").find(" of 2 judged"), std::string::npos);
   EXPECT_EQ(kept.provenance.count("git_revision"), 1u);
-  EXPECT_NE(text_of(junit).find("pour-56k-stream"), std::string::npos);
+  EXPECT_NE(bytes_of(junit).find("pour-56k-stream"), std::string::npos);
 }
 
 TEST(InterruptedCommand, BenchKeepsItsRows) {
@@ -164,7 +161,7 @@ TEST(InterruptedCommand, BenchKeepsItsRows) {
   });
   EXPECT_EQ(end.status, 128 + SIGTERM) << end.out;
   EXPECT_NE(end.out.find("interrupted: 0 of 1 timed"), std::string::npos) << end.out;
-  const auto kept = nlohmann::json::parse(text_of(json));
+  const auto kept = nlohmann::json::parse(bytes_of(json));
   EXPECT_EQ(kept.at("rows").size(), 0u);
   EXPECT_EQ(kept.at("interrupted").get<std::string>(), "interrupted: 0 of 1 timed or refused");
 }

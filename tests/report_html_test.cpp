@@ -3,6 +3,7 @@
 #include "oracle/files/report_file.hpp"
 #include "oracle/report/report.hpp"
 #include "reference/state.hpp"
+#include "tests/file_bytes.hpp"
 #include "tests/python.hpp"
 #include "tests/temporary_folder.hpp"
 
@@ -77,10 +78,7 @@ class ReportPage : public testing::Test {
   int run() {
     return test::run_python({DECANT_SOURCE_DIR "/tools/python/report_html.py", (folder_ / "report.h5").string()});
   }
-  std::string page() {
-    std::ifstream in(folder_ / "report.html");
-    return {std::istreambuf_iterator<char>(in), {}};
-  }
+  std::string page() { return test::bytes_of(folder_ / "report.html"); }
   test::TemporaryFolder folder_;
 };
 

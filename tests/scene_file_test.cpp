@@ -7,6 +7,7 @@
 #include "reference/initial_state.hpp"
 #include "reference/scene_format.hpp"
 #include "reference/scene_schema.hpp"
+#include "tests/file_bytes.hpp"
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -361,13 +362,10 @@ TEST(ShippedScenes, PoursDifferInSpacingAlone) {
   EXPECT_EQ(read("pour-4k.json"), read("pour-56k.json"));
 }
 
-std::string text_of(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
+using test::bytes_of;
 
 TEST(SceneSchema, IsTheOneThatTheFormatGives) {
-  EXPECT_EQ(text_of(scenes / "scene.schema.json"), scene_schema())
+  EXPECT_EQ(bytes_of(scenes / "scene.schema.json"), scene_schema())
       << "ci/build --only decant_scene_schema dev && "
          "build/dev/bin/decant_scene_schema > fixtures/scenes/scene.schema.json";
 }
@@ -384,7 +382,7 @@ TEST(SceneSchema, DefinesWhatItRefersTo) {
 }
 
 TEST(SceneExample, HasEveryKeyOfTheFormat) {
-  const std::string text = text_of(scenes / "example.json");
+  const std::string text = bytes_of(scenes / "example.json");
   for (const ObjectFormat& object : scene_format())
     for (const Member& member : object.members)
       EXPECT_NE(text.find('"' + member.key + '"'), std::string::npos) << object.name << "." << member.key;
@@ -407,7 +405,7 @@ void visit_members(const json& at, const json::json_pointer& pointer, const std:
 
 /// A key that the reader never looks at would pass whatever stands there.
 TEST(SceneExample, EveryKeyOfItIsRead) {
-  const json example = json::parse(text_of(scenes / "example.json"), nullptr, true, true);
+  const json example = json::parse(bytes_of(scenes / "example.json"), nullptr, true, true);
   int keys = 0;
   visit_members(example, json::json_pointer(), "", [&](const json::json_pointer& at, const std::string& path) {
     json scene = example;

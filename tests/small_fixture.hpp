@@ -10,6 +10,7 @@
 #include "reference/sampling.hpp"
 #include "reference/scene_file.hpp"
 #include "reference/shapes.hpp"
+#include "tests/file_bytes.hpp"
 #include "tests/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
@@ -82,10 +83,7 @@ class FixtureFile : public testing::Test {
  protected:
   void SetUp() override { write_fixture(file_, small_fixture()); }
 
-  std::string bytes() const {
-    std::ifstream in(file_, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
-  }
+  std::string bytes() const { return test::bytes_of(file_); }
   void replace_bytes(const std::string& content) const {
     std::ofstream(file_, std::ios::binary | std::ios::trunc) << content;
   }

@@ -5,6 +5,7 @@
 #include "oracle/files/hdf5_handle.hpp"
 #include "oracle/files/hdf5_io.hpp"
 #include "tests/falling_points.hpp"
+#include "tests/file_bytes.hpp"
 #include "tests/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
@@ -92,11 +93,7 @@ frames::Layout write_frames(const fs::path& folder, std::int64_t n = particles) 
   return layout;
 }
 
-std::string text_of(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file).rdbuf();
-  return text.str();
-}
+using test::bytes_of;
 
 const std::vector<std::pair<std::string, std::string>> shown_arrays = {
     {"/VTKHDF/Points", "/fluid/position"},
@@ -188,7 +185,7 @@ TEST(FramesVtkHdf, IsTheSameFileForTheSameFrames) {
     write_frames(folder / name);
   }
   for (const char* file : {"frames.vtkhdf", "walls.vtkhdf"})
-    EXPECT_TRUE(text_of(folder / "a" / file) == text_of(folder / "b" / file)) << file;
+    EXPECT_TRUE(bytes_of(folder / "a" / file) == bytes_of(folder / "b" / file)) << file;
 }
 
 TEST(FramesVtkHdf, IsWrittenForAPourWithoutParticles) {

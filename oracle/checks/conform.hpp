@@ -69,7 +69,8 @@ PreparedReference prepare_reference(const Fixture& fixture, const CheckSelection
                                     int sample_every = 0);
 
 /// Loads the fixture into the backend and compares; a backend that throws or reports trouble gives
-/// rows with verdict fail and the reason: one of the check `run`, and one of every check that was not made. Rows of the check `fields` carry the stage's name:
+/// rows with verdict fail and the reason: one of the check `run`, and one of every check that was not made.
+/// Rows of the check `fields` carry the stage's name:
 ///   neighbors, boundary_volume, density, pressure   as the backend computes them
 ///   equation_of_state, acceleration   from the oracle's density, and pressure
 ///   evaluation                        from the backend's own

@@ -78,17 +78,6 @@ ParticleState nearest_images(ParticleState got, const Scene& scene,
   return got;
 }
 
-const Answered& all_answered() {
-  static const Answered all = [] {
-    Answered names{"position", "velocity"};
-    for (const auto& field : stage_fields) names.insert(field.name);
-    for (const auto& field : acceleration_fields) names.insert(field.name);
-    for (const auto& fact : neighbor_facts) names.insert(fact.name);
-    return names;
-  }();
-  return all;
-}
-
 Answered answered_by(std::uint32_t offers) {
   Answered names;
   const auto add = [&](std::uint32_t bit, std::initializer_list<const char*> fields) {
@@ -104,6 +93,11 @@ Answered answered_by(std::uint32_t offers) {
     for (const auto& fact : neighbor_facts) names.insert(fact.name);
   add(Offer::step, {"position", "velocity"});
   return names;
+}
+
+const Answered& all_answered() {
+  static const Answered all = answered_by(Offer::all);
+  return all;
 }
 
 void check_stages(const Fields& got, const Answered& answered, const PreparedReference& oracle, RowBuilder& builder) {

@@ -48,9 +48,9 @@ using plugin::Unpacker;
 
 /// Beside the running program, where builds and installations put it.
 fs::path host_program() {
+  if (const char* named = std::getenv("DECANT_PLUGIN_HOST")) return named;
   std::error_code none;
   const fs::path beside = fs::read_symlink("/proc/self/exe", none).parent_path() / "decant-plugin-host";
-  if (const char* named = std::getenv("DECANT_PLUGIN_HOST")) return named;
   if (!fs::exists(beside, none))
     throw BackendError(beside.string() + ": not found; DECANT_PLUGIN_HOST may say where it is");
   return beside;

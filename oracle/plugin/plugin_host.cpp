@@ -86,6 +86,33 @@ class Fenced {
   std::vector<T> values_;
 };
 
+/// In the order of the answer.
+struct RealField {
+  const char* name;
+  double* decant_fields::* member;
+  std::size_t components;
+};
+constexpr RealField real_fields[] = {
+    {"boundary_volume", &decant_fields::boundary_volume, 1},
+    {"density", &decant_fields::density, 1},
+    {"pressure", &decant_fields::pressure, 1},
+    {"acceleration", &decant_fields::acceleration, 3},
+    {"pressure_acceleration", &decant_fields::pressure_acceleration, 3},
+    {"viscous_acceleration", &decant_fields::viscous_acceleration, 3},
+    {"wall_pressure_acceleration", &decant_fields::wall_pressure_acceleration, 3},
+    {"wall_viscous_acceleration", &decant_fields::wall_viscous_acceleration, 3},
+};
+struct CountField {
+  const char* name;
+  std::int64_t* decant_fields::* member;
+};
+constexpr CountField count_fields[] = {
+    {"fluid_neighbor_count", &decant_fields::fluid_neighbor_count},
+    {"fluid_neighbor_id_sum", &decant_fields::fluid_neighbor_id_sum},
+    {"wall_neighbor_count", &decant_fields::wall_neighbor_count},
+    {"wall_neighbor_id_sum", &decant_fields::wall_neighbor_id_sum},
+};
+
 class Host {
  public:
   Host(const std::string& library, const std::string& options) : table_(table_of(library)) {
@@ -184,24 +211,17 @@ class Host {
                              or_null(inputs.pressure)};
     const auto n = static_cast<std::size_t>(state_.size()), m = static_cast<std::size_t>(wall_position_.cols());
     const double nan = std::numeric_limits<double>::quiet_NaN();
+    decant_fields fields{};
+    fields.size = sizeof fields;
+    fields.fluid = state_.size();
+    fields.walls = wall_position_.cols();
     std::vector<Fenced<double>> reals;
-    reals.emplace_back("boundary_volume", m, nan);
-    for (const char* name : {"density", "pressure"}) reals.emplace_back(name, n, nan);
-    for (const char* name : {"acceleration", "pressure_acceleration", "viscous_acceleration",
-                             "wall_pressure_acceleration", "wall_viscous_acceleration"})
-      reals.emplace_back(name, 3 * n, nan);
+    for (const RealField& field : real_fields) {
+      const std::size_t size = field.member == &decant_fields::boundary_volume ? m : field.components * n;
+      fields.*field.member = reals.emplace_back(field.name, size, nan).data();
+    }
     std::vector<Fenced<std::int64_t>> counts;
-    for (const char* name :
-         {"fluid_neighbor_count", "fluid_neighbor_id_sum", "wall_neighbor_count", "wall_neighbor_id_sum"})
-      counts.emplace_back(name, n, -1);
-    decant_fields fields{sizeof fields,    0,
-                         state_.size(),    wall_position_.cols(),
-                         reals[0].data(),  reals[1].data(),
-                         reals[2].data(),  reals[3].data(),
-                         reals[4].data(),  reals[5].data(),
-                         reals[6].data(),  reals[7].data(),
-                         counts[0].data(), counts[1].data(),
-                         counts[2].data(), counts[3].data()};
+    for (const CountField& field : count_fields) fields.*field.member = counts.emplace_back(field.name, n, -1).data();
     decant_status status = no_trouble();
     call(table_.evaluate(solver_, is_given ? &given : nullptr, &fields, &status));
     for (const auto& values : reals) values.require_whole();

@@ -61,7 +61,7 @@ std::vector<Line> lines_of(const std::vector<CheckRow>& rows) {
       lines.push_back({backend, row.fixture});
       line = lines.end() - 1;
     }
-    if (row.verdict == Verdict::not_run && row.reason == not_offered) {
+    if (is_left_out(row)) {
       line->left_out.insert(row.check);
       continue;
     }
@@ -202,7 +202,7 @@ std::string console_table(const Report& report) {
                     line.worst ? fmt::format("{:.3g}", line.worst->score) : "-", fitted(check_of(line), check_width));
   std::string rest;
   for (const auto& row : report.rows)
-    if (verdict_of(row) != Verdict::pass && row.reason != not_offered) rest += in_full(row);
+    if (verdict_of(row) != Verdict::pass && !is_left_out(row)) rest += in_full(row);
   std::set<std::string> left_out;
   for (const auto& line : lines)
     if (!line.left_out.empty())

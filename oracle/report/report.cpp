@@ -72,7 +72,7 @@ int exit_status(const Report& report) {
   for (const auto& row : report.rows) {
     const Verdict verdict = verdict_of(row);
     fails |= verdict == Verdict::fail;
-    missing |= verdict == Verdict::not_run && row.reason != not_offered;
+    missing |= verdict == Verdict::not_run && !is_left_out(row);
     judged |= verdict != Verdict::not_run;
   }
   missing |= !judged;

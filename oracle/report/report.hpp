@@ -60,6 +60,9 @@ struct CheckRow {
   std::vector<double> score_quantiles;
 };
 
+/// Whether the row is about something that its backend does not offer.
+inline bool is_left_out(const CheckRow& row) { return row.verdict == Verdict::not_run && row.reason == not_offered; }
+
 inline constexpr std::array<int, 9> quantile_percent = {0, 1, 5, 25, 50, 75, 95, 99, 100};
 
 /// Fills the row's score quantiles from its arrays, and drops the arrays where the row passes, so

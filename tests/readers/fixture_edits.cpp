@@ -3,6 +3,7 @@
 #include "tests/readers/fixture_edits.hpp"
 
 #include "oracle/files/hdf5_handle.hpp"
+#include "tests/file_bytes.hpp"
 
 #include <unistd.h>
 
@@ -198,10 +199,7 @@ ScratchFile::~ScratchFile() {
   std::error_code ignored;
   std::filesystem::remove(path_, ignored);
 }
-std::string ScratchFile::bytes() const {
-  std::ifstream in(path_, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
+std::string ScratchFile::bytes() const { return test::bytes_of(path_); }
 
 std::string edited_fixture(std::string_view bytes, unsigned seed) {
   if (!is_sealed(bytes)) return {};

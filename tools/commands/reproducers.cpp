@@ -6,6 +6,7 @@
 #include "oracle/files/fixture_file.hpp"
 #include "oracle/report/console_table.hpp"
 #include "tools/common/build_provenance.hpp"
+#include "tools/common/file_name.hpp"
 #include "tools/common/recording.hpp"
 
 #include <fmt/format.h>
@@ -17,19 +18,10 @@
 namespace decant {
 namespace {
 
-/// Letters, digits and "._-" stay; everything else becomes a dash.
-std::string plain(std::string text) {
-  for (char& c : text) {
-    const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
-    if (!letter && c != '.' && c != '_') c = '-';
-  }
-  return text;
-}
-
 std::string name_of(const CheckRow& row) {
   const std::string options = row.options.empty() ? "" : ":" + row.options;
-  return fmt::format("{}-{}-{}-{}-{}.h5", plain(row.fixture), plain(row.backend + options), plain(row.check),
-                     plain(row.field), row.worst_id);
+  return fmt::format("{}-{}-{}-{}-{}.h5", plain_file_name(row.fixture), plain_file_name(row.backend + options),
+                     plain_file_name(row.check), plain_file_name(row.field), row.worst_id);
 }
 
 bool can_be_cut_out(const CheckRow& row) {

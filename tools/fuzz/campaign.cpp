@@ -6,6 +6,7 @@
 #include "oracle/files/fixture_file.hpp"
 #include "reference/scene_file.hpp"
 #include "tools/common/build_provenance.hpp"
+#include "tools/common/file_name.hpp"
 #include "tools/common/recording.hpp"
 
 #include <fmt/format.h>
@@ -13,7 +14,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cctype>
 #include <chrono>
 #include <cmath>
 #include <exception>
@@ -160,13 +160,13 @@ std::string write_counterexample(const std::filesystem::path& folder, const Coun
   std::string backend = counterexample.outcome.backend;
   // Of a plug-in the library, not where it lies.
   if (const auto slash = backend.rfind('/'); slash != std::string::npos) backend.replace(0, slash + 1, "plugin-");
-  std::ranges::replace_if(backend, [](unsigned char c) { return !std::isalnum(c) && c != '.' && c != '_'; }, '-');
-  return write_case(folder, counterexample.fuzz_case,
-                    fmt::format("fuzz-{}-{}-{}", counterexample.seed, backend, counterexample.outcome.property),
-                    {{"fuzz_seed", fmt::format("{}", counterexample.seed)},
-                     {"fuzz_property", counterexample.outcome.property},
-                     {"fuzz_backend", counterexample.outcome.backend},
-                     {"fuzz_reason", counterexample.outcome.reason}});
+  return write_case(
+      folder, counterexample.fuzz_case,
+      fmt::format("fuzz-{}-{}-{}", counterexample.seed, plain_file_name(backend), counterexample.outcome.property),
+      {{"fuzz_seed", fmt::format("{}", counterexample.seed)},
+       {"fuzz_property", counterexample.outcome.property},
+       {"fuzz_backend", counterexample.outcome.backend},
+       {"fuzz_reason", counterexample.outcome.reason}});
 }
 
 }  // namespace decant::fuzz

@@ -42,7 +42,7 @@ Outcome joined(const std::string& backend, const std::string& property, const st
   for (const CheckRow& row : rows) {
     // `run` says again what a check that was left says.
     const bool mine = property == "fields" ? !checked.contains(row.check) && row.check != "run" : row.check == property;
-    if (!mine || (row.verdict == Verdict::not_run && row.reason == not_offered)) continue;
+    if (!mine || is_left_out(row)) continue;
     const bool fails = verdict_of(row) != Verdict::pass;
     // More particles than usual may stand where fp32 cannot tell; that says nothing about a backend.
     if (fails && row.excluded > 0 && (row.n == 0 || row.score <= 1)) continue;
