@@ -140,6 +140,8 @@ TEST(Drift, RecommendsWhatIsWithinTheTolerance) {
   EXPECT_EQ(drift::recommend(made, 1e-3)->list.interval, 1);
   EXPECT_EQ(drift::recommend({}, 1), nullptr);
 }
+  std::swap(made[0], made[1]);
+  EXPECT_EQ(drift::recommend(made, 1e-3)->list.interval, 1);
 
 TEST(Drift, HoldsOnStatesThatTheRecommendationHasNotSeen) {
   constexpr double tolerance = 1e-2;

@@ -9,6 +9,7 @@
 #include "reference/shapes.hpp"
 #include "reference/solver.hpp"
 #include "tests/generators.hpp"
+#include "tests/scene_folder.hpp"
 
 #include <gtest/gtest.h>
 
@@ -18,7 +19,7 @@
 namespace decant::test {
 namespace {
 
-const std::filesystem::path scenes = std::filesystem::path(DECANT_SOURCE_DIR) / "fixtures/scenes";
+using test::scenes;
 
 constexpr double dx = 0.01;    // m
 constexpr double side = 0.06;  // m, of the cross-section, which repeats along y and z

@@ -69,6 +69,12 @@ TEST(Limits, NameTheFirstFrameAndParticleBeyondAndTheLargestOfAll) {
   EXPECT_TRUE(std::isnan(found[1].largest));
   EXPECT_EQ(found[2].limit, "density");
   EXPECT_EQ(found[2].particle, 21);
+  // What was NaN once is not forgotten for what comes later.
+  rows[1].max_speed = rows[4].max_speed;
+  rows[4].max_speed = 6;
+  found = pour::limits_exceeded(rows, limits);
+  EXPECT_TRUE(std::isnan(found[0].largest));
+  EXPECT_TRUE(std::isnan(found[1].largest));
 }
 
 /// Under tension this fluid tears itself to pieces, ten times as fast as its container is tall.

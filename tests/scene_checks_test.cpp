@@ -9,6 +9,7 @@
 #include "reference/scene_file.hpp"
 #include "reference/shapes.hpp"
 #include "reference/sweep.hpp"
+#include "tests/scene_folder.hpp"
 #include "tests/special_values.hpp"
 
 #include <gtest/gtest.h>
@@ -20,7 +21,7 @@
 namespace decant {
 namespace {
 
-const std::filesystem::path scenes = std::filesystem::path(DECANT_SOURCE_DIR) / "fixtures/scenes";
+using test::scenes;
 
 /// Two cups side by side, 9 mm apart, one pouring into the other; its numbers are used below.
 Scene pour() {

@@ -8,6 +8,7 @@
 #include "reference/scene_format.hpp"
 #include "reference/scene_schema.hpp"
 #include "tests/file_bytes.hpp"
+#include "tests/scene_folder.hpp"
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -23,7 +24,7 @@ namespace {
 
 using nlohmann::json;
 
-const std::filesystem::path scenes = std::filesystem::path(DECANT_SOURCE_DIR) / "fixtures/scenes";
+using test::scenes;
 
 json valid_scene() {
   return json::parse(R"({

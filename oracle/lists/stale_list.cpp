@@ -2,6 +2,8 @@
 /// Lists against the truth, pair by pair, and the fields of both.
 #include "oracle/lists/stale_list.hpp"
 
+#include "reference/larger.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -57,8 +59,7 @@ FieldDeficit deficit(const Matrix& whole, const Matrix& partial, const Matrix& t
   for (Eigen::Index k = 0; k < error.size(); ++k) {
     const double e = std::abs(error.reshaped()[k]);
     if (e == 0) continue;
-    const double score = e / tolerance.reshaped()[k];
-    if (!(score <= d.score)) d.score = score;
+    d.score = larger(d.score, e / tolerance.reshaped()[k]);
   }
   return d;
 }

@@ -5,6 +5,7 @@
 #include "reference/error.hpp"
 #include "reference/initial_state.hpp"
 #include "reference/sampling.hpp"
+#include "tools/common/clock.hpp"
 #include "tools/drift/drift.hpp"
 #include "tools/pour/pour.hpp"
 
@@ -14,10 +15,6 @@
 
 namespace decant::drift {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 Vec3 momentum(const Scene& scene, const ParticleState& state) {
   return scene.particle_mass() * state.velocity.rowwise().sum();

@@ -1,5 +1,6 @@
 /// \file
 /// The cheapest list that stays within a tolerance everywhere it was measured.
+#include "reference/larger.hpp"
 #include "tools/drift/drift.hpp"
 
 #include <algorithm>
@@ -15,9 +16,6 @@ const Row* same_list(const Result& result, const ListChoice& list) {
     if (row.list.interval == list.interval && (list.interval == 0 || row.list.skin == list.skin)) return &row;
   return nullptr;
 }
-
-/// NaN is larger than anything.
-double larger(double a, double b) { return !(b <= a) ? b : a; }
 
 }  // namespace
 

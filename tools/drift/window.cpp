@@ -2,7 +2,9 @@
 /// The window is run once; every list is looked at along it. Lists of the same build and skin serve all
 /// intervals that rebuild there.
 #include "reference/error.hpp"
+#include "reference/larger.hpp"
 #include "reference/sampling.hpp"
+#include "tools/common/clock.hpp"
 #include "tools/drift/drift.hpp"
 
 #include <fmt/format.h>
@@ -16,10 +18,6 @@
 
 namespace decant::drift {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 std::vector<ParticleState> run_window(const Fixture& fixture, const Walls& walls, Backend& backend, int substeps) {
   std::vector<ParticleState> states(static_cast<std::size_t>(substeps) + 1);
@@ -57,10 +55,7 @@ double share(std::int64_t part, std::int64_t whole) {
   return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0.0;
 }
 
-/// NaN is larger than anything.
-void raise(double& largest, double value) {
-  if (!(value <= largest)) largest = value;
-}
+void raise(double& largest, double value) { largest = larger(largest, value); }
 
 /// RMS over neighbors within H at the build of how far they moved against each other, over H.
 double relative_motion(const Scene& scene, const Instant& built, const Instant& now) {

@@ -2,6 +2,8 @@
 /// Looks for the first row beyond each limit.
 #include "tools/pour/limits.hpp"
 
+#include "reference/larger.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,8 +19,7 @@ std::vector<LimitExceeded> limits_exceeded(const std::vector<TimelineRow>& rows,
     for (const TimelineRow& row : rows) {
       if (row.*value <= bound) continue;
       ++e.frames;
-      // NaN once seen stays.
-      if (e.frames == 1 || !(row.*value <= e.largest)) e.largest = row.*value;
+      e.largest = e.frames == 1 ? row.*value : larger(e.largest, row.*value);
       if (e.frames > 1) continue;
       e.frame = row.frame;
       e.particle = row.*particle;

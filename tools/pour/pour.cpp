@@ -11,6 +11,7 @@
 #include "reference/scene_checks.hpp"
 #include "reference/scene_file.hpp"
 #include "tools/common/build_provenance.hpp"
+#include "tools/common/clock.hpp"
 #include "tools/common/progress.hpp"
 #include "tools/common/stop_watcher.hpp"
 #include "tools/frames/csv_writer.hpp"
@@ -36,10 +37,6 @@
 namespace decant::pour {
 namespace fs = std::filesystem;
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 bool finite(const ParticleState& state) { return all_finite(state.position) && all_finite(state.velocity); }
 
