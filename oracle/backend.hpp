@@ -15,6 +15,7 @@ struct Walls;
 struct ParticleState;
 struct Fields;
 struct StageInputs;
+struct Neighbors;
 
 struct BackendInfo {
   std::string name;       // "brute"
@@ -72,7 +73,9 @@ enum Bit : std::uint32_t {
   walls = 64,  // scenes with wall particles
   step = 128,  // advance and read
   status = 256,
-  all = 511
+  all = 511,      // that checks need
+  lists = 512,    // Backend::lists
+  rebuild = 1024  // options rebuild=N:skin=S
 };
 }  // namespace Offer
 
@@ -94,6 +97,9 @@ class Backend {
   virtual void read(ParticleState& out) const = 0;
   virtual StageTimes stage_times() const = 0;
   virtual NeighborStats neighbor_stats() const = 0;
+  /// The lists that the next substep uses, ascending; the substep of the state that they were built at. Throws
+  /// BackendError where `offers` lacks them.
+  virtual std::int64_t lists(Neighbors& out) const;
 };
 
 }  // namespace decant

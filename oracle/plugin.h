@@ -30,7 +30,9 @@ enum decant_offer {
   DECANT_OFFERS_BOUNDARY_VOLUME = 1u << 5, /**< volumes of wall particles */
   DECANT_OFFERS_WALLS = 1u << 6,           /**< scenes with wall particles */
   DECANT_OFFERS_STEP = 1u << 7,            /**< advance() and read() */
-  DECANT_OFFERS_STATUS = 1u << 8           /**< decant_status */
+  DECANT_OFFERS_STATUS = 1u << 8,          /**< decant_status */
+  DECANT_OFFERS_LISTS = 1u << 9,           /**< lists() */
+  DECANT_OFFERS_REBUILD = 1u << 10         /**< options rebuild=N, skin=S (share of H); lists miss nothing without */
 };
 
 enum decant_kernel { DECANT_CUBIC_SPLINE = 0, DECANT_WENDLAND_C2 = 1, DECANT_MUELLER_2003 = 2 };
@@ -130,6 +132,27 @@ typedef struct decant_status {
   int64_t substep;  /**< first one it was seen after, counted as decant_state counts */
 } decant_status;
 
+/** The lists that the next substep uses. What it points to stays the plug-in's, until the next call. Entries in any
+ * order; a pair of the fluid is in the lists of both its particles. */
+typedef struct decant_lists {
+  uint32_t size;
+  uint32_t unused;
+  int64_t built;                /**< substep of the state that they were built at */
+  const int64_t* fluid_offsets; /**< [fluid + 1], from 0 on: list i is fluid[fluid_offsets[i] … fluid_offsets[i + 1]) */
+  const int32_t* fluid;         /**< ids */
+  const int64_t* wall_offsets;  /**< [fluid + 1] */
+  const int32_t* wall;          /**< numbers of wall particles */
+} decant_lists;
+
+/** Since load(): seconds and timed passes per stage, and how often lists were built. Not all substeps need be timed. */
+typedef struct decant_stage_times {
+  uint32_t size;
+  uint32_t unused;
+  double build, density, force, integrate; /**< s */
+  int64_t build_calls, density_calls, force_calls, integrate_calls;
+  int64_t rebuilds;
+} decant_stage_times;
+
 /** Calls return 0, or anything else with last_error() saying why. Those that an offer does not need may be null. */
 typedef struct decant_plugin_table {
   uint32_t abi;  /**< DECANT_PLUGIN_ABI */
@@ -155,6 +178,10 @@ typedef struct decant_plugin_table {
   const char* (*device)(void* solver);
   /** Memory held on a device, bytes; may be null. */
   int64_t (*bytes)(void* solver);
+  /** May be null without DECANT_OFFERS_LISTS. */
+  int (*lists)(void* solver, decant_lists*);
+  /** May be null. */
+  int (*stage_times)(void* solver, decant_stage_times*);
 } decant_plugin_table;
 
 /** The one function that a plug-in exports. \param host_abi  DECANT_PLUGIN_ABI of the host

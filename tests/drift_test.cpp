@@ -15,12 +15,15 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
 
 namespace decant {
 namespace {
 
-std::unique_ptr<Backend> list_on_host(const std::string& options) {
-  return choose_backend("list" + (options.empty() ? "" : ":" + options), "host");
+std::unique_ptr<Backend> list_on_host(const drift::ListChoice& list, bool counting) {
+  const std::string options = list.options();
+  return choose_backend("list" + (options.empty() ? "" : ":" + options) + (counting ? ":check_completeness=on" : ""),
+                        "host");
 }
 
 Fixture recorded(const std::string& phase) {
@@ -33,7 +36,7 @@ const Fixture& splash() {
 }
 
 drift::Plan plan_of(const std::vector<int>& intervals, const std::vector<double>& skins, int window, bool timed) {
-  return {drift::all_lists(intervals, skins), window, timed};
+  return {drift::all_lists(intervals, skins), true, window, timed};
 }
 
 const drift::Result& measured() {
@@ -98,7 +101,7 @@ TEST(Drift, TheSkinThatTheoryAsksForKeepsTheTolerance) {
   for (const char* phase : {"splash", "filling"}) {
     const Fixture fixture = recorded(phase);
     for (const double tolerance : {1e-2, 1e-4}) {
-      drift::Plan plan{drift::derived_lists({fixture}, {10}, tolerance), 20, false};
+      drift::Plan plan{drift::derived_lists({fixture}, {10}, tolerance), true, 20, false};
       ASSERT_EQ(plan.lists.size(), 1u);
       const double skin = plan.lists[0].skin;
       EXPECT_LT(skin, 0.5);
@@ -138,10 +141,10 @@ TEST(Drift, RecommendsWhatIsWithinTheTolerance) {
   EXPECT_EQ(drift::recommend(made, 1e-3)->list.interval, 0);
   made[1].rows[3].acceleration_rms = NAN;
   EXPECT_EQ(drift::recommend(made, 1e-3)->list.interval, 1);
-  EXPECT_EQ(drift::recommend({}, 1), nullptr);
-}
   std::swap(made[0], made[1]);
   EXPECT_EQ(drift::recommend(made, 1e-3)->list.interval, 1);
+  EXPECT_EQ(drift::recommend({}, 1), nullptr);
+}
 
 TEST(Drift, HoldsOnStatesThatTheRecommendationHasNotSeen) {
   constexpr double tolerance = 1e-2;
@@ -159,7 +162,7 @@ TEST(Drift, HoldsOnStatesThatTheRecommendationHasNotSeen) {
   ASSERT_NE(best, nullptr);
   EXPECT_GT(best->list.interval, 1);
   for (const char* phase : {"tilt-onset", "stream", "dense-walls-stream", "rest"}) {
-    const drift::Result unseen = drift::measure(recorded(phase), {{best->list}, 20, false}, list_on_host);
+    const drift::Result unseen = drift::measure(recorded(phase), {{best->list}, true, 20, false}, list_on_host);
     EXPECT_LE(unseen.rows[0].acceleration_rms, tolerance) << phase;
   }
 }
@@ -172,7 +175,7 @@ TEST(Drift, AlongAPourLooksJustBeforeEachRebuildAndPassesThePhases) {
   test::FallingPoints points;
   const drift::PourResult pour = drift::along_pour(
       scene, plan_of({1, 6}, {0}, 10, false), 5,
-      [](const std::string&) { return std::make_unique<test::FallingPoints>(); }, phases);
+      [](const drift::ListChoice&, bool) { return std::make_unique<test::FallingPoints>(); }, phases);
   ASSERT_EQ(pour.moments.size(), 10u);
   for (std::size_t k = 0; k < 10; ++k) {
     EXPECT_EQ(pour.moments[k].sample.stale.age, k % 2 ? 5 : 0);
@@ -190,9 +193,9 @@ TEST(Drift, OfWholePoursIsNothingForTheSameListAndSomethingForAnother) {
   std::vector<drift::WholePour> pours;
   drift::whole_pours(
       scene, plan_of({5}, {0}, 10, false), 2,
-      [&](const std::string& o) {
+      [&](const drift::ListChoice& list, bool) {
         auto backend = std::make_unique<test::FallingPoints>();
-        if (o.starts_with("rebuild=5")) backend->trouble_at = 150;
+        if (list.interval == 5) backend->trouble_at = 150;
         ++made;
         return backend;
       },

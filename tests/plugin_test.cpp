@@ -60,7 +60,10 @@ TEST(PluginHeader, GrowsAtItsEndsOnly) {
   EXPECT_EQ(offsetof(decant_given, pressure) + sizeof(void*), 32U);
   EXPECT_EQ(offsetof(decant_fields, wall_neighbor_id_sum) + sizeof(void*), 120U);
   EXPECT_EQ(offsetof(decant_status, substep) + sizeof(std::int64_t), 24U);
+  EXPECT_EQ(offsetof(decant_lists, wall) + sizeof(void*), 48U);
+  EXPECT_EQ(offsetof(decant_stage_times, rebuilds) + sizeof(std::int64_t), 80U);
   EXPECT_EQ(offsetof(decant_plugin_table, bytes) + sizeof(void*), 104U);
+  EXPECT_EQ(offsetof(decant_plugin_table, stage_times) + sizeof(void*), 120U);
   EXPECT_EQ(offsetof(decant_pose, surface_velocity), 168U);
 }
 

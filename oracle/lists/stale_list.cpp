@@ -98,6 +98,20 @@ StaleList::StaleList(const Scene& scene, const Eigen::VectorXd& volumes, const I
       wall_(built.walls.position),
       listed_(std::move(listed)) {}
 
+void compare_fields(const Scene& scene, const Instant& now, const Fields& actual, Staleness& out) {
+  const Fields &whole = now.fields, &allowed = now.tolerance;
+  const auto row = [](const Eigen::VectorXd& v) { return Eigen::RowVectorXd(v.transpose()); };
+  out.density = deficit(row(whole.density), row(actual.density), row(allowed.density));
+  out.pressure = deficit(row(whole.pressure), row(actual.pressure), row(allowed.pressure));
+  const Eigen::Matrix3Xd g = scene.gravity.replicate(1, now.state.size());
+  out.acceleration = deficit(Eigen::Matrix3Xd(whole.acceleration - g), Eigen::Matrix3Xd(actual.acceleration - g),
+                             allowed.acceleration);
+  out.wall_acceleration =
+      deficit(Eigen::Matrix3Xd(whole.wall_pressure_acceleration + whole.wall_viscous_acceleration),
+              Eigen::Matrix3Xd(actual.wall_pressure_acceleration + actual.wall_viscous_acceleration),
+              Eigen::Matrix3Xd(allowed.wall_pressure_acceleration + allowed.wall_viscous_acceleration));
+}
+
 Staleness StaleList::at(const Instant& now) const {
   const Separation separation(scene_.domain);
   const double H = scene_.support_radius();
@@ -111,17 +125,7 @@ Staleness StaleList::at(const Instant& now) const {
   if (s.fluid.missed + s.wall.missed == 0) return s;
   Fields stale;
   evaluate<double>(scene_, now.state, now.walls, volumes_, kept, stale);
-  const Fields &whole = now.fields, &allowed = now.tolerance;
-  const auto row = [](const Eigen::VectorXd& v) { return Eigen::RowVectorXd(v.transpose()); };
-  s.density = deficit(row(whole.density), row(stale.density), row(allowed.density));
-  s.pressure = deficit(row(whole.pressure), row(stale.pressure), row(allowed.pressure));
-  const Eigen::Matrix3Xd g = scene_.gravity.replicate(1, now.state.size());
-  s.acceleration =
-      deficit(Eigen::Matrix3Xd(whole.acceleration - g), Eigen::Matrix3Xd(stale.acceleration - g), allowed.acceleration);
-  s.wall_acceleration =
-      deficit(Eigen::Matrix3Xd(whole.wall_pressure_acceleration + whole.wall_viscous_acceleration),
-              Eigen::Matrix3Xd(stale.wall_pressure_acceleration + stale.wall_viscous_acceleration),
-              Eigen::Matrix3Xd(allowed.wall_pressure_acceleration + allowed.wall_viscous_acceleration));
+  compare_fields(scene_, now, stale, s);
   return s;
 }
 

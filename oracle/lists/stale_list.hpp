@@ -56,6 +56,9 @@ struct Instant {
   Fields tolerance;  // of a backend in fp32
 };
 
+/// How far fields at an instant's state are from it. Pairs and displacements stay as they are.
+void compare_fields(const Scene& scene, const Instant& now, const Fields& actual, Staleness& out);
+
 /// The oracle's view of a state. \param volumes  of the wall particles
 Instant instant_of(const Scene& scene, const Walls& walls, const WallSolution& volumes, const ParticleState& state);
 

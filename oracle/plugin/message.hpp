@@ -18,7 +18,7 @@
 namespace decant::plugin {
 
 /// Requests, each answered by `done` with what it asks for, or `failed` with a text.
-enum class Code : std::uint32_t { load = 1, evaluate, advance, read, done, failed };
+enum class Code : std::uint32_t { load = 1, evaluate, advance, read, lists, stage_times, done, failed };
 
 struct Message {
   Code code{};

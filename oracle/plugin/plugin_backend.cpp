@@ -2,28 +2,23 @@
 /// The side of the command: starts the process, asks, and says what became of it.
 #include "oracle/plugin/plugin_backend.hpp"
 
+#include "oracle/lists/given_lists.hpp"
 #include "oracle/plugin.h"
+#include "oracle/plugin/flat_scene.hpp"
 #include "oracle/plugin/message.hpp"
+#include "oracle/plugin/process.hpp"
 #include "reference/error.hpp"
+#include "reference/neighbors.hpp"
 #include "reference/state.hpp"
 
 #include <fmt/format.h>
-#include <signal.h>
-#include <spawn.h>
-#include <sys/socket.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <initializer_list>
 #include <system_error>
 #include <utility>
-
-extern char** environ;
 
 namespace decant {
 namespace {
@@ -34,9 +29,9 @@ constexpr bool same(std::initializer_list<std::uint32_t> theirs, Ours... ours) {
 }
 static_assert(same({DECANT_OFFERS_DENSITY, DECANT_OFFERS_ACCELERATION, DECANT_OFFERS_PARTS, DECANT_OFFERS_NEIGHBORS,
                     DECANT_OFFERS_GIVEN, DECANT_OFFERS_BOUNDARY_VOLUME, DECANT_OFFERS_WALLS, DECANT_OFFERS_STEP,
-                    DECANT_OFFERS_STATUS},
+                    DECANT_OFFERS_STATUS, DECANT_OFFERS_LISTS, DECANT_OFFERS_REBUILD},
                    Offer::density, Offer::acceleration, Offer::parts, Offer::neighbors, Offer::given,
-                   Offer::boundary_volume, Offer::walls, Offer::step, Offer::status));
+                   Offer::boundary_volume, Offer::walls, Offer::step, Offer::status, Offer::lists, Offer::rebuild));
 static_assert(same({DECANT_NON_FINITE, DECANT_ESCAPED, DECANT_CAPACITY, DECANT_MISSED_PAIR}, Status::non_finite,
                    Status::escaped, Status::capacity, Status::missed_pair));
 
@@ -56,109 +51,18 @@ fs::path host_program() {
   return beside;
 }
 
-struct Socket {
-  int fd = -1;
-  explicit Socket(int number = -1) : fd(number) {}
-  Socket(Socket&& other) noexcept : fd(std::exchange(other.fd, -1)) {}
-  Socket& operator=(Socket&& other) noexcept {
-    std::swap(fd, other.fd);
-    return *this;
-  }
-  ~Socket() {
-    if (fd >= 0) ::close(fd);
-  }
+/// What to start, and what to call it.
+struct Start {
+  std::string called;  // "plugin:PATH", for people
+  std::string program;
+  std::vector<std::string> arguments;  // and the options
 };
-
-/// The process of a plug-in.
-class Process {
- public:
-  Process(const std::string& path, const std::string& options) {
-    std::array<int, 2> ends{};
-    if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0)
-      throw BackendError(fmt::format("plug-in {}: no socket: {}", path, std::strerror(errno)));
-    Socket ours(ends[0]), theirs(ends[1]);
-    const std::string program = host_program().string();
-    const std::string number = std::to_string(plugin_socket);
-    std::array<char*, 4> arguments{const_cast<char*>(program.c_str()), const_cast<char*>(path.c_str()),
-                                   const_cast<char*>(options.c_str()), nullptr};
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_adddup2(&actions, theirs.fd, plugin_socket);
-    const int error = ::posix_spawn(&id_, program.c_str(), &actions, nullptr, arguments.data(), environ);
-    posix_spawn_file_actions_destroy(&actions);
-    if (error != 0) throw BackendError(fmt::format("{}: {}", program, std::strerror(error)));
-    socket_ = std::move(ours);
-  }
-  Process(const Process&) = delete;
-  Process& operator=(const Process&) = delete;
-  ~Process() { end(); }
-
-  int socket() const { return socket_.fd; }
-
-  /// Kills it if it still runs; "was ended by signal 11 (Segmentation fault)".
-  std::string end() {
-    if (id_ <= 0) return "has ended";
-    // What is about to end by itself says how.
-    int status = 0;
-    pid_t ended = 0;
-    for (int wait = 0; wait < 20 && (ended = ::waitpid(id_, &status, WNOHANG)) == 0; ++wait) ::usleep(wait_us);
-    if (ended == 0) {
-      ::kill(id_, SIGKILL);
-      ::waitpid(id_, &status, 0);
-      id_ = -1;
-      return "was ended";
-    }
-    id_ = -1;
-    if (WIFSIGNALED(status))
-      return fmt::format("was ended by signal {} ({})", WTERMSIG(status), ::strsignal(WTERMSIG(status)));
-    return fmt::format("left with exit status {}", WEXITSTATUS(status));
-  }
-  void kill() {
-    if (id_ > 0) ::kill(id_, SIGKILL);
-  }
-
-  static constexpr int plugin_socket = 3;
-
- private:
-  static constexpr unsigned wait_us = 5000;
-  pid_t id_ = -1;
-  Socket socket_;
-};
-
-decant_scene flat_scene(const Scene& scene) {
-  decant_scene s{};
-  s.size = sizeof s;
-  s.kernel = static_cast<std::int32_t>(scene.kernel);
-  s.particle_spacing = scene.particle_spacing;
-  s.support_radius = scene.support_radius();
-  s.particle_mass = scene.particle_mass();
-  s.rest_density = scene.fluid.rest_density;
-  s.sound_speed = scene.fluid.sound_speed;
-  s.eos_exponent = scene.fluid.eos_exponent;
-  s.eos_stiffness = scene.eos_stiffness();
-  s.allow_tension = scene.fluid.allow_tension;
-  s.viscosity = scene.fluid.viscosity;
-  s.wall_viscosity = scene.fluid.wall_viscosity;
-  for (int k = 0; k < 3; ++k) {
-    s.gravity[k] = scene.gravity[k];
-    s.domain_min[k] = scene.domain.min[k];
-    s.domain_max[k] = scene.domain.max[k];
-    s.periodic[k] = scene.domain.periodic[static_cast<std::size_t>(k)];
-  }
-  s.has_floor = scene.floor.has_value();
-  s.floor_height = scene.floor ? scene.floor->height : 0;
-  s.contact_distance = scene.contact_distance();
-  s.restitution = scene.contact.restitution;
-  s.friction = scene.contact.friction;
-  s.time_step = scene.time_step();
-  s.containers = static_cast<std::int32_t>(scene.containers.size());
-  return s;
-}
 
 class PluginBackend : public Backend {
  public:
-  PluginBackend(std::string path, std::string options, double limit)
-      : path_(std::move(path)), options_(std::move(options)), limit_(limit) {
+  PluginBackend(Start how, std::string options, double limit)
+      : how_(std::move(how)), options_(std::move(options)), limit_(limit) {
+    how_.arguments.push_back(options_);
     start();
   }
 
@@ -188,6 +92,7 @@ class PluginBackend : public Backend {
     pack(out, copy.velocity);
     substep_ = state.substep;
     particles_ = state.size();
+    wall_particles_ = walls.size();
     loaded_ = true;
     (void)ask(Code::load, std::move(out.bytes), "load");
   }
@@ -238,22 +143,67 @@ class PluginBackend : public Backend {
     pack(in, out.velocity);
   }
 
-  StageTimes stage_times() const override { return {}; }
+  StageTimes stage_times() const override {
+    const decant_stage_times t = times();
+    return {{t.build, t.build_calls},
+            {t.density, t.density_calls},
+            {t.force, t.force_calls},
+            {t.integrate, t.integrate_calls}};
+  }
   NeighborStats neighbor_stats() const override {
     NeighborStats stats = stats_;
     stats.device_bytes = bytes_;
+    stats.rebuilds = times().rebuilds;
     return stats;
   }
 
+  std::int64_t lists(Neighbors& out) const override {
+    require_loaded();
+    if (!(offers_ & Offer::lists)) return Backend::lists(out);
+    const std::string answer = ask(Code::lists, {}, "lists");
+    Unpacker in(answer);
+    std::int64_t built = -1;
+    in(built);
+    const auto read = [&](const char* which, std::int64_t targets, bool of_fluid) {
+      std::vector<std::int64_t> offsets;
+      std::vector<std::int32_t> entries;
+      pack(in, offsets);
+      pack(in, entries);
+      const RefuseList refuse = [&](const char* part, const std::string& value, const std::string& bound) {
+        throw BackendError(
+            fmt::format("{}, lists at substep {}, {}{}: {}; {}", name(), substep_, which, part, value, bound));
+      };
+      IdVector count(static_cast<Eigen::Index>(offsets.size()) - 1);
+      for (Eigen::Index i = 0; i < count.size(); ++i)
+        count[i] = offsets[static_cast<std::size_t>(i) + 1] - offsets[static_cast<std::size_t>(i)];
+      (void)checked_entries(count, targets, refuse);
+      IdVector ids(static_cast<Eigen::Index>(entries.size()));
+      std::copy(entries.begin(), entries.end(), ids.begin());
+      return checked_lists(count, ids, targets, of_fluid, refuse);
+    };
+    out.fluid = read("fluid", particles_, true);
+    out.wall = read("wall", wall_particles_, false);
+    return built;
+  }
+
  private:
-  std::string name() const { return "plug-in " + path_; }
+  std::string name() const { return "plug-in " + how_.called.substr(how_.called.find(':') + 1); }
   void require_loaded() const {
     if (!loaded_) throw BackendError(name() + ": nothing is loaded");
     if (!process_) throw BackendError(name() + " is not there any more");
   }
 
+  decant_stage_times times() const {
+    decant_stage_times times{};
+    if (!process_ || !loaded_) return times;
+    const std::string answer = ask(Code::stage_times, {}, "stage_times");
+    Unpacker in(answer);
+    in(times);
+    return times;
+  }
+
   void start() {
-    process_ = std::make_unique<Process>(path_, options_);
+    process_ = std::make_unique<plugin::Process>(how_.program, how_.arguments);
     Message hello;
     try {
       hello = plugin::receive(process_->socket(), std::chrono::duration<double>(limit_));
@@ -262,7 +212,7 @@ class PluginBackend : public Backend {
     }
     if (hello.code != Code::done) {
       process_.reset();
-      throw InputError("command line", "--backend", "plugin:" + path_, hello.bytes);
+      throw InputError("command line", "--backend", how_.called, hello.bytes);
     }
     Unpacker in(hello.bytes);
     in(offers_);
@@ -303,45 +253,81 @@ class PluginBackend : public Backend {
     return status;
   }
 
-  std::string path_, options_;
+  Start how_;
+  std::string options_;
   double limit_;
-  mutable std::unique_ptr<Process> process_;
+  mutable std::unique_ptr<plugin::Process> process_;
   BackendInfo info_;
   std::uint32_t offers_ = 0;
   bool loaded_ = false;
   std::int64_t substep_ = 0;
-  Eigen::Index particles_ = 0;
+  Eigen::Index particles_ = 0, wall_particles_ = 0;
   std::int64_t bytes_ = 0;
   NeighborStats stats_;
 };
 
 }  // namespace
 
-std::unique_ptr<Backend> make_plugin_backend(const std::string& choice) {
-  const auto refuse = [&](const std::string& why) {
-    throw InputError("command line", "--backend", "plugin:" + choice, why);
-  };
-  std::string path = choice.substr(0, choice.find(':')), options;
+namespace {
+
+/// "WHAT:key=value:…": options from the first key on.
+struct Choice {
+  std::string what, options;
   double limit = plugin_time_limit;
-  for (std::size_t at = path.size(); at < choice.size();) {
-    const std::size_t end = std::min(choice.find(':', at + 1), choice.size());
+};
+
+/// \param names  parts between colons that come before the options
+Choice parse(const char* kind, const std::string& choice, int names) {
+  const auto refuse = [&](const std::string& why) {
+    throw InputError("command line", "--backend", std::string(kind) + ":" + choice, why);
+  };
+  Choice out;
+  std::size_t end = choice.find(':');
+  for (int k = 1; k < names && end != std::string::npos; ++k) end = choice.find(':', end + 1);
+  out.what = choice.substr(0, end);
+  for (std::size_t at = out.what.size(); at < choice.size();) {
+    end = std::min(choice.find(':', at + 1), choice.size());
     const std::string option = choice.substr(at + 1, end - at - 1);
     at = end;
     const std::string key = option.substr(0, option.find('='));
     if (key.empty() || key.size() == option.size()) refuse("options are key=value");
     if (key != "time_limit") {
-      options += (options.empty() ? "" : ":") + option;
+      out.options += (out.options.empty() ? "" : ":") + option;
       continue;
     }
     char* rest = nullptr;
     const std::string value = option.substr(key.size() + 1);
-    limit = std::strtod(value.c_str(), &rest);
-    if (value.empty() || *rest != '\0' || !(limit > 0 && limit <= 1e6)) refuse("time_limit is in (0, 1e6] s");
+    out.limit = std::strtod(value.c_str(), &rest);
+    if (value.empty() || *rest != '\0' || !(out.limit > 0 && out.limit <= 1e6)) refuse("time_limit is in (0, 1e6] s");
   }
-  if (path.empty()) refuse("plugin:PATH of a shared library");
+  return out;
+}
+
+}  // namespace
+
+std::unique_ptr<Backend> make_plugin_backend(const std::string& choice) {
+  const Choice chosen = parse("plugin", choice, 1);
+  const auto refuse = [&](const std::string& why) {
+    throw InputError("command line", "--backend", "plugin:" + choice, why);
+  };
+  if (chosen.what.empty()) refuse("plugin:PATH of a shared library");
   std::error_code none;
-  if (!fs::is_regular_file(path, none)) refuse("a shared library (oracle/plugin/README.md)");
-  return std::make_unique<PluginBackend>(fs::absolute(path).string(), options, limit);
+  if (!fs::is_regular_file(chosen.what, none)) refuse("a shared library (oracle/plugin/README.md)");
+  const std::string path = fs::absolute(chosen.what).string();
+  return std::make_unique<PluginBackend>(Start{"plugin:" + path, host_program().string(), {path}}, chosen.options,
+                                         chosen.limit);
+}
+
+std::unique_ptr<Backend> make_python_backend(const std::string& choice) {
+  const Choice chosen = parse("python", choice, 2);
+  const auto colon = chosen.what.find(':');
+  if (colon == 0 || colon == std::string::npos || colon + 1 == chosen.what.size())
+    throw InputError("command line", "--backend", "python:" + choice,
+                     "python:FILE:CLASS or python:MODULE:CLASS, a class derived from decant.Port");
+  const char* named = std::getenv("DECANT_PYTHON");
+  return std::make_unique<PluginBackend>(
+      Start{"python:" + chosen.what, named && *named ? named : "python3", {"-m", "decant.serve", chosen.what}},
+      chosen.options, chosen.limit);
 }
 
 }  // namespace decant

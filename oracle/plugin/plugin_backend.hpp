@@ -17,4 +17,8 @@ inline constexpr double plugin_time_limit = 60;
 /// \param choice  "PATH" or "PATH:key=value:…"; all but time_limit is the plug-in's
 std::unique_ptr<Backend> make_plugin_backend(const std::string& choice);
 
+/// The same of a Python class (tools/package): in a Python of its own, DECANT_PYTHON or the PATH's python3, which has
+/// the package. \param choice  "FILE:CLASS" or "MODULE:CLASS", and options as above
+std::unique_ptr<Backend> make_python_backend(const std::string& choice);
+
 }  // namespace decant

@@ -88,6 +88,8 @@ std::unique_ptr<Backend> make_reference_backend(NeighborSearch search) {
   return std::make_unique<ReferenceBackend>(search);
 }
 
+std::int64_t Backend::lists(Neighbors&) const { throw BackendError(info().name + " does not offer its lists"); }
+
 std::string describe(const Status& status) {
   if (status.ok()) return "ok";
   std::string what;

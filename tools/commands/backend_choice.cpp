@@ -71,17 +71,20 @@ std::vector<std::string> backend_choices() {
   return names;
 }
 
+bool is_plugin(const std::string& choice) { return choice.starts_with("plugin:") || choice.starts_with("python:"); }
+
 std::unique_ptr<Backend> choose_backend(const std::string& choice, const std::string& executor) {
   const auto colon = choice.find(':');
   const std::string name = choice.substr(0, colon);
   const std::string options = colon == std::string::npos ? "" : choice.substr(colon + 1);
-  if (name == "plugin") {
+  if (is_plugin(choice)) {
     if (executor != "auto") refuse("--executor", executor, "a plug-in runs on what it is built for");
-    return make_plugin_backend(options);
+    return name == "python" ? make_python_backend(options) : make_plugin_backend(options);
   }
   const auto choices = backend_choices();
   if (std::find(choices.begin(), choices.end(), name) == choices.end())
-    refuse("--backend", name, fmt::format("must be one of {}, plugin:PATH", fmt::join(choices, ", ")));
+    refuse("--backend", name,
+           fmt::format("must be one of {}, plugin:PATH, python:FILE:CLASS", fmt::join(choices, ", ")));
   if (name != "reference") return make_backend(name, executor_of(executor), options);
   if (executor == "cuda") refuse("--executor", executor, "the reference runs on the host only");
   if (executor != "auto" && executor != "host") (void)executor_of(executor);

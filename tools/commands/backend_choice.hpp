@@ -34,10 +34,13 @@ struct BackendFlags {
   std::map<std::string, int> used_;
 };
 
+/// Of a solver that is built elsewhere, plugin:… or python:….
+bool is_plugin(const std::string& choice);
+
 /// What --backend accepts: "reference" and the table of backends under test.
 std::vector<std::string> backend_choices();
 
-/// The backend of that choice, NAME or NAME:OPTIONS ("reference:all-pairs").
+/// The backend of that choice: NAME or NAME:OPTIONS ("reference:all-pairs"), plugin:PATH, python:FILE:CLASS.
 /// \param executor  "auto" (cuda where there is a device, else host),
 /// "cuda" or "host"; the reference runs on the host only
 /// Throws InputError for an unknown name, DeviceAbsent where the executor has no device.

@@ -55,6 +55,9 @@ constexpr const char* drift_footer =
     "approach. Powers: of the relative motion, ± 95 %, (what the kernel's edge gives).\n"
     "--recommend also tries, for each interval, the skin that theory asks for (*), and keeps half the\n"
     "tolerance for states that were not measured.\n"
+    "A plug-in that offers to choose lists (options rebuild, skin) is swept as `list` is. Others get a row\n"
+    "`own`: what the lists that they give lack, or else how far their fields are from the oracle's at the\n"
+    "same states; deviation is then from the oracle's run.\n"
     "Exit status: 0 measured, 1 --recommend finds nothing within the tolerance, 2 bad input, 3 a\n"
     "backend failed, 77 the device of --executor is absent, 130 after Ctrl-C (143: SIGTERM): what was\n"
     "measured by then is in table and report.\n"
@@ -87,12 +90,27 @@ void check(DriftArguments& arguments) {
     refuse("--samples", std::to_string(arguments.samples), "1 to 100000");
   if (!(arguments.tolerance > 0)) refuse("--tolerance", fmt::format("{}", arguments.tolerance), "> 0");
   if (arguments.recommend && arguments.untimed) refuse("--recommend", "given", "without --untimed: it compares times");
-  if (arguments.backend != "list") refuse("--backend", arguments.backend, "list, which alone keeps lists");
+  if (arguments.backend != "list" && !is_plugin(arguments.backend))
+    refuse("--backend", arguments.backend, "list, which alone keeps lists, or a plug-in");
   if (!arguments.series.empty() && arguments.inputs.size() != 1)
     refuse("--series", arguments.series, "one FIXTURE, whose scene it is of");
   if (!arguments.series.empty() && (arguments.recommend || arguments.whole))
     refuse("--series", arguments.series, "without --recommend and --full-run: it is only looked at");
   check_output_place("--report", arguments.report);
+}
+
+/// Throws InputError where a plug-in cannot be asked for this.
+void check_offers(const DriftArguments& arguments, const Backend& plugin) {
+  const auto refuse = [&](const char* option, const char* bound) {
+    throw InputError("command line", option, arguments.backend, bound);
+  };
+  constexpr std::uint32_t needed = Offer::density | Offer::acceleration;
+  if (!(plugin.offers() & Offer::step)) refuse("--backend", "a plug-in that offers to advance");
+  if (!(plugin.offers() & Offer::lists) && (plugin.offers() & needed) != needed)
+    refuse("--backend", "a plug-in that offers its lists, or density and acceleration");
+  if (plugin.offers() & Offer::rebuild) return;
+  if (arguments.recommend) refuse("--recommend", "only for a plug-in that offers to choose lists (rebuild, skin)");
+  if (arguments.whole) refuse("--full-run", "only for a plug-in that offers to choose lists (rebuild, skin)");
 }
 
 /// States of a scene to begin windows from: the phases of a pour, or eighths of the time.
@@ -118,16 +136,16 @@ std::vector<Fixture> phases_of(const Scene& scene) {
   return states;
 }
 
-void print(const drift::Recommendation* best, double tolerance, std::size_t windows) {
+void print(const drift::Recommendation* best, const std::string& backend, double tolerance, std::size_t windows) {
   if (!best) {
     fmt::print("\nno list measured stays within {:g}, not even the adaptive one\n", tolerance);
     return;
   }
   const bool adaptive = best->list.interval == 0;
   fmt::print(
-      "\nrecommended, for acceleration within {:g} (relative RMS) in each of {} windows: --backend list{}{}\n"
+      "\nrecommended, for acceleration within {:g} (relative RMS) in each of {} windows: --backend {}{}{}\n"
       "  error {:.1e} at the worst substep, {}; {:.1f} us per substep, the adaptive list {:.1f} us\n",
-      tolerance, windows, adaptive ? "" : ":", best->list.options(), best->worst_error,
+      tolerance, windows, backend, adaptive ? "" : ":", best->list.options(), best->worst_error,
       adaptive ? "by proof" : fmt::format("theory expected {:.1e}", best->expected_error), best->substep_us,
       best->adaptive_us);
   if (adaptive)
@@ -153,12 +171,20 @@ void run(DriftArguments& arguments, int& exit_status) {
     exit_status = exit_pass;
     return;
   }
-  const auto make_list = [&](const std::string& options) {
-    return choose_backend("list" + (options.empty() ? "" : ":" + options), arguments.executor);
+  const bool plugin = is_plugin(arguments.backend);
+  const drift::ListMaker make_list = [&](const drift::ListChoice& list, bool counting) {
+    const std::string options = list.options();
+    // A plug-in's misses are counted from the lists that it gives.
+    return choose_backend(arguments.backend + (options.empty() ? "" : ":" + options) +
+                              (counting && !plugin ? ":check_completeness=on" : ""),
+                          arguments.executor);
   };
-  const BackendInfo info = make_list("")->info();
+  const auto asked = make_list(drift::own_list, false);
+  const BackendInfo info = asked->info();
+  if (plugin) check_offers(arguments, *asked);
   if (arguments.inputs.empty()) arguments.inputs = default_fixtures();
-  drift::Plan plan{drift::all_lists(arguments.intervals, arguments.skins), arguments.window, !arguments.untimed};
+  drift::Plan plan{drift::all_lists(arguments.intervals, arguments.skins),
+                   !plugin || (asked->offers() & Offer::rebuild), arguments.window, !arguments.untimed};
   std::vector<Fixture> states;
   std::vector<Scene> scenes;
   for (const auto& file : arguments.inputs) {
@@ -220,7 +246,7 @@ void run(DriftArguments& arguments, int& exit_status) {
   exit_status = exit_pass;
   if (!arguments.recommend) return;
   const auto best = drift::recommend(results, arguments.tolerance);
-  print(best.get(), arguments.tolerance, results.size());
+  print(best.get(), arguments.backend, arguments.tolerance, results.size());
   if (!best) exit_status = exit_does_not_conform;
 }
 
@@ -236,7 +262,8 @@ void add_drift_command(CLI::App& app, int& exit_status) {
       ->capture_default_str();
   verb.add_option("--skins", arguments->skins, "shares of H")->delimiter(',')->capture_default_str();
   verb.add_option("--window", arguments->window, "substeps that are run from each state")->capture_default_str();
-  verb.add_option("--backend", arguments->backend, "what is timed and followed")->capture_default_str();
+  verb.add_option("--backend", arguments->backend, "list, or plugin:PATH: what is timed and followed")
+      ->capture_default_str();
   verb.add_option("--executor", arguments->executor, "cuda, host, or auto: the GPU where there is one")
       ->capture_default_str();
   verb.add_option("--report", arguments->report, "HDF5 file for rows and samples");

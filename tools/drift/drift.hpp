@@ -25,7 +25,7 @@ inline constexpr double not_measured = std::numeric_limits<double>::quiet_NaN();
 
 /// When a list is rebuilt, and how much further than H it reaches.
 struct ListChoice {
-  int interval = 1;      // substeps between rebuilds; 0: before a pair can be missed; −1: as a series tells
+  int interval = 1;      // substeps between rebuilds; 0: before a pair can be missed; −1: its owner's way
   double skin = 0;       // share of H; NaN for intervals below 1
   bool derived = false;  // the skin is the one that theory asks for (list_theory.hpp)
 
@@ -35,6 +35,7 @@ struct ListChoice {
 /// Which lists are held to all pairs, and for how long.
 struct Plan {
   std::vector<ListChoice> lists;  // intervals >= 1
+  bool chooses = true;            // false: the backend keeps its lists its own way, and is timed and followed so
   int window = 50;                // substeps
   bool timed = true;              // false: no list is run to be timed and followed
 };
@@ -63,7 +64,8 @@ struct Row {
   // Substeps after a rebuild at which a pair is first missed, and until which displacements prove that
   // none is; the earliest over the window's lists, the interval itself where there is none.
   int first_miss = 1, proved_until = 1;
-  // What the backend's own lists miss in the same window, mean: counted on the device (list:check_completeness=on).
+  // What the backend's own lists miss in the same window, mean: as it counts itself (list:check_completeness=on), or
+  // by the lists that it gives.
   double own_missed_share = not_measured, own_wall_missed_share = not_measured;
   ExpectedDrift expected;  // by theory, from the window's first state, at the list's last substep
   double substep_us = not_measured, rebuild_every = not_measured;
@@ -127,8 +129,13 @@ struct PourResult {
   std::vector<WholePour> whole;
 };
 
-/// Makes a list backend of these options: ("rebuild=5:skin=0.1"); empty: the default.
-using ListMaker = std::function<std::unique_ptr<Backend>(const std::string& options)>;
+/// Makes a backend with that list. \param counting  it counts what it misses, if it can
+using ListMaker = std::function<std::unique_ptr<Backend>(const ListChoice& list, bool counting)>;
+
+/// Lists that miss nothing, rebuilt when displacements ask for it.
+inline const ListChoice complete_list{0, not_measured, false};
+/// Lists as the backend keeps them.
+inline const ListChoice own_list{-1, not_measured, false};
 
 /// Throws BackendError where a backend reports trouble, as the functions below do.
 void require_ok(const Backend& backend, const Status& status);
@@ -144,6 +151,17 @@ Result measure(const Fixture& fixture, const Plan& plan, const ListMaker& make_l
 /// Times every list from the fixture's state and follows it beside complete ones.
 void time_and_follow(const Fixture& fixture, const Walls& walls, int window, const ListMaker& make_list,
                      Result& result);
+
+/// The time of a substep of `backend`, and where it is after the ensemble's substeps beside `right`, run alike.
+void time_beside(const Fixture& fixture, const Walls& walls, int window, Backend& backend, Backend& right, Row& row);
+
+/// Of the window's pairs within H, those that the lists of a backend lack that gives them: both kinds, and the wall's.
+std::array<double, 2> missed_of_given_lists(const Fixture& fixture, const Walls& walls, Backend& backend, int window);
+
+/// A backend as it is, whose lists nobody chooses: from a window, what its lists lack or, where it does not give them,
+/// how far its fields are from the oracle's at the same states; its time per substep; and where it is after the
+/// ensemble's substeps beside the oracle. Row and samples are added to `result`.
+void measure_as_it_is(const Fixture& fixture, int window, bool timed, Backend& backend, Result& result);
 
 /// For each interval the smallest skin that theory expects to stay within the tolerance in every one of
 /// these states, rounded up to 0.01.

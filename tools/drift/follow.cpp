@@ -20,7 +20,9 @@ Vec3 momentum(const Scene& scene, const ParticleState& state) {
   return scene.particle_mass() * state.velocity.rowwise().sum();
 }
 
-double share(std::int64_t part, std::int64_t whole) {
+/// Of what a backend counted; one that counts nothing tells nothing.
+double share(std::int64_t part, std::int64_t whole, const PairTotals& counted) {
+  if (counted.pairs + counted.wall_pairs == 0) return not_measured;
   return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0.0;
 }
 
@@ -34,26 +36,32 @@ void load_grown(const Fixture& fixture, const Walls& walls, Backend& list) {
 
 /// The backend's own account of a window. Not while it is timed: counting costs more than a substep.
 void count_missed(const Fixture& fixture, const Walls& walls, Backend& list, int window, Row& row) {
+  if (list.offers() & Offer::lists) {
+    const auto missed = missed_of_given_lists(fixture, walls, list, window);
+    row.own_missed_share = missed[0];
+    row.own_wall_missed_share = missed[1];
+    return;
+  }
   load_grown(fixture, walls, list);
   require_ok(list, list.advance(window));
   const PairTotals counted = list.neighbor_stats().verified;
-  row.own_missed_share = share(counted.missed + counted.wall_missed, counted.pairs + counted.wall_pairs);
-  row.own_wall_missed_share = share(counted.wall_missed, counted.wall_pairs);
+  row.own_missed_share = share(counted.missed + counted.wall_missed, counted.pairs + counted.wall_pairs, counted);
+  row.own_wall_missed_share = share(counted.wall_missed, counted.wall_pairs, counted);
 }
 
-/// Options of a list that counts what it misses.
-std::string verified(const ListChoice& list) {
-  const std::string options = list.options();
-  return options + (options.empty() ? "" : ":") + "check_completeness=on";
-}
-
-/// Where the fluid is after the ensemble's substeps, and the time of a substep in the window after.
-ParticleState follow_one(const Fixture& fixture, const Walls& walls, Backend& list, int window, Row& row) {
+/// Where the fluid is after the ensemble's substeps.
+ParticleState follow(const Fixture& fixture, const Walls& walls, Backend& list, int window) {
   const auto substeps = fixture.ensemble.members > 0 ? static_cast<int>(fixture.ensemble.substeps) : window;
   load_grown(fixture, walls, list);
   require_ok(list, list.advance(substeps));  // records, too
   ParticleState end;
   list.read(end);
+  return end;
+}
+
+/// The same, and the time of a substep in the window after.
+ParticleState follow_and_time(const Fixture& fixture, const Walls& walls, Backend& list, int window, Row& row) {
+  const ParticleState end = follow(fixture, walls, list, window);
   require_ok(list, list.advance(1));  // the second advance is timed by stages
   // A short run is timed more than once.
   double best = INFINITY, spent = 0;
@@ -77,6 +85,15 @@ struct Course {
   std::vector<Vec3> momentum;  // kg m/s
   WholePour pour;
 };
+
+void put_apart(const Fixture& fixture, const ParticleState& end, const ParticleState& right, Row& row) {
+  const Scene& scene = fixture.scene;
+  const Divergence away = divergence(scene, end, right);
+  row.deviation = away[0] / scene.particle_spacing;
+  row.energy_drift = away[4];
+  row.momentum_drift = (momentum(scene, end) - momentum(scene, right)).norm();
+  if (fixture.ensemble.members > 0) row.deviation_over_ensemble = away[0] / fixture.ensemble.mean[0];
+}
 
 constexpr int samples_at_whole = 100;
 
@@ -108,8 +125,8 @@ Course run_course(const Scene& scene, const Walls& walls, const ParticleState& s
   course.pour.energy_lost = course.energy.front() - course.energy.back();
   const NeighborStats stats = backend.neighbor_stats();
   const PairTotals& counted = stats.verified;
-  course.pour.missed_share = share(counted.missed + counted.wall_missed, counted.pairs + counted.wall_pairs);
-  course.pour.wall_missed_share = share(counted.wall_missed, counted.wall_pairs);
+  course.pour.missed_share = share(counted.missed + counted.wall_missed, counted.pairs + counted.wall_pairs, counted);
+  course.pour.wall_missed_share = share(counted.wall_missed, counted.wall_pairs, counted);
   course.pour.rebuild_every = static_cast<double>(all) / static_cast<double>(std::max<std::int64_t>(1, stats.rebuilds));
   return course;
 }
@@ -133,27 +150,26 @@ void compare(const Course& right, Course& course) {
 void time_and_follow(const Fixture& fixture, const Walls& walls, int window, const ListMaker& make_list,
                      Result& result) {
   const auto start = Clock::now();
-  const Scene& scene = fixture.scene;
   Row adaptive;
   adaptive.fixture = fixture.name;
-  adaptive.list = {0, not_measured, false};
+  adaptive.list = complete_list;
   adaptive.first_miss = adaptive.proved_until = 0;
-  const ParticleState right = follow_one(fixture, walls, *make_list(""), window, adaptive);
+  const ParticleState right = follow_and_time(fixture, walls, *make_list(complete_list, false), window, adaptive);
   adaptive.deviation = adaptive.deviation_over_ensemble = 0;
   adaptive.energy_drift = adaptive.momentum_drift = 0;
-  count_missed(fixture, walls, *make_list(verified(adaptive.list)), window, adaptive);
+  count_missed(fixture, walls, *make_list(complete_list, true), window, adaptive);
   for (Row& row : result.rows) {
-    const auto list = make_list(row.list.options());
-    const ParticleState end = follow_one(fixture, walls, *list, window, row);
-    const Divergence away = divergence(scene, end, right);
-    count_missed(fixture, walls, *make_list(verified(row.list)), window, row);
-    row.deviation = away[0] / scene.particle_spacing;
-    row.energy_drift = away[4];
-    row.momentum_drift = (momentum(scene, end) - momentum(scene, right)).norm();
-    if (fixture.ensemble.members > 0) row.deviation_over_ensemble = away[0] / fixture.ensemble.mean[0];
+    const auto list = make_list(row.list, false);
+    put_apart(fixture, follow_and_time(fixture, walls, *list, window, row), right, row);
+    count_missed(fixture, walls, *make_list(row.list, true), window, row);
   }
   result.rows.push_back(adaptive);
   result.run_seconds = seconds_since(start);
+}
+
+void time_beside(const Fixture& fixture, const Walls& walls, int window, Backend& backend, Backend& right, Row& row) {
+  const ParticleState end = follow_and_time(fixture, walls, backend, window, row);
+  put_apart(fixture, end, follow(fixture, walls, right, window), row);
 }
 
 void whole_pours(const Scene& scene, const Plan& plan, int perturbed, const ListMaker& make_list, const DoPart& do_part,
@@ -162,7 +178,7 @@ void whole_pours(const Scene& scene, const Plan& plan, int perturbed, const List
   const ParticleState start = initial_state(scene);
   const auto run = [&](const ParticleState& from, const ListChoice& list) {
     Course course;
-    do_part([&] { course = run_course(scene, walls, from, *make_list(verified(list))); });
+    do_part([&] { course = run_course(scene, walls, from, *make_list(list, true)); });
     return course;
   };
   const auto add = [&](Course course, const ListChoice& list, std::uint32_t perturbation) {
@@ -171,15 +187,14 @@ void whole_pours(const Scene& scene, const Plan& plan, int perturbed, const List
     course.pour.perturbation = perturbation;
     pours.push_back(course.pour);
   };
-  const ListChoice complete{0, not_measured, false};
-  Course right = run(start, complete);
+  Course right = run(start, complete_list);
   if (!right.pour.trouble.empty()) throw BackendError(scene.name + ", complete lists: " + right.pour.trouble);
   compare(right, right);
-  add(right, complete, 0);
+  add(right, complete_list, 0);
   for (int k = 1; k <= perturbed; ++k) {
-    Course course = run(pour::perturbed_start(start, static_cast<std::uint32_t>(k)), complete);
+    Course course = run(pour::perturbed_start(start, static_cast<std::uint32_t>(k)), complete_list);
     compare(right, course);
-    add(std::move(course), complete, static_cast<std::uint32_t>(k));
+    add(std::move(course), complete_list, static_cast<std::uint32_t>(k));
   }
   for (const ListChoice& list : plan.lists) {
     Course course = run(start, list);

@@ -21,7 +21,7 @@ PourResult along_pour(const Scene& scene, const Plan& plan, int samples, const L
   std::set<int> ages = {0};
   for (const ListChoice& list : plan.lists) ages.insert(list.interval - 1);
 
-  const auto complete = make_list("");
+  const auto complete = make_list(complete_list, false);
   ParticleState state = initial_state(scene);
   complete->load(scene, walls, state);
   const auto go_to = [&](std::int64_t substep) {

@@ -62,7 +62,7 @@ void list_columns(Columns<Row>& c) {
   c.text("fixture", [](const Row& r) { return r.fixture; });
   c.whole(
       "interval", [](const Row& r) { return r.list.interval; },
-      "substeps between rebuilds; 0: before a pair can be missed; -1: as a series tells");
+      "substeps between rebuilds; 0: before a pair can be missed; -1: as its owner does");
   c.real("skin", "1", [](const Row& r) { return r.list.skin; }, "share of H; NaN for intervals below 1");
   c.whole("derived", [](const Row& r) { return r.list.derived; }, "1: the skin that theory asks for");
 }
@@ -92,7 +92,7 @@ void write_rows(Hdf5Writer& out, const std::vector<Row>& rows) {
   c.real("wall_acceleration_rms", "1", [](const R& r) { return r.wall_acceleration_rms; }, "the wall's terms alone");
   c.real(
       "own_missed_share", "1", [](const R& r) { return r.own_missed_share; },
-      "of the backend's own lists in the same window, counted on the device; NaN: not run");
+      "of the backend's own lists in the same window, by its count or by the lists it gives; NaN: not told");
   c.real("own_wall_missed_share", "1", [](const R& r) { return r.own_wall_missed_share; });
   c.real(
       "expected_missed_share", "1", [](const R& r) { return r.expected.missed_share; },
@@ -174,7 +174,7 @@ void write_whole(Hdf5Writer& out, const std::vector<WholePour>& pours) {
 }
 
 std::string name_of(const ListChoice& list) {
-  return list.interval == 0 ? "auto" : list.interval < 0 ? "given" : fmt::format("{}", list.interval);
+  return list.interval == 0 ? "auto" : list.interval < 0 ? "own" : fmt::format("{}", list.interval);
 }
 
 }  // namespace
@@ -197,7 +197,7 @@ std::string table(const std::vector<Result>& results) {
                       miss(row.missed_share), percent(row.own_missed_share), miss(row.worst_missed_share),
                       miss(row.expected.missed_share), miss(row.wall_missed_share),
                       !measured || row.first_miss == row.list.interval ? "-" : fmt::format("{}", row.first_miss),
-                      !measured                               ? "-"
+                      !measured || row.proved_until < 0       ? "-"
                       : row.proved_until == row.list.interval ? "all"
                                                               : fmt::format("{}", row.proved_until),
                       error(row.density_rms), error(row.acceleration_rms), error(row.expected.acceleration_rms),

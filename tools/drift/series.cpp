@@ -1,13 +1,13 @@
 /// \file
 /// Lists of another program, checked as any input, then looked at like our own.
 #include "oracle/files/hdf5_io.hpp"
+#include "oracle/lists/given_lists.hpp"
 #include "reference/error.hpp"
 #include "reference/sampling.hpp"
 #include "tools/drift/drift.hpp"
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <chrono>
 #include <map>
 
@@ -16,46 +16,13 @@ namespace {
 
 /// One kind of neighbors, ascending.
 std::vector<std::vector<std::int32_t>> read_lists(const Hdf5Reader& in, const std::string& path, std::int64_t particles,
-                                                  std::int64_t targets, bool own_ids) {
+                                                  std::int64_t targets, bool of_fluid) {
+  const RefuseList refuse = [&](const char* part, const std::string& value, const std::string& bound) {
+    in.fail(path + part, value, bound);
+  };
   const IdVector count = in.integers(path + "_count", particles);
-  std::int64_t sum = 0;
-  for (const std::int64_t c : count) {
-    if (c < 0 || c > targets) in.fail(path + "_count", fmt::format("{}", c), fmt::format("0 to {}", targets));
-    sum += c;
-  }
-  const IdVector entries = in.integers(path, sum);
-  std::vector<std::vector<std::int32_t>> lists(static_cast<std::size_t>(particles));
-  Eigen::Index at = 0;
-  for (std::size_t i = 0; i < lists.size(); ++i) {
-    auto& list = lists[i];
-    for (std::int64_t c = 0; c < count[static_cast<Eigen::Index>(i)]; ++c) {
-      const std::int64_t j = entries[at++];
-      if (j < 0 || j >= targets)
-        in.fail(path, fmt::format("entry {} of particle {}", j, i), fmt::format("0 to {}", targets - 1));
-      if (own_ids && j == static_cast<std::int64_t>(i))
-        in.fail(path, fmt::format("particle {} in its own list", i), "others only");
-      list.push_back(static_cast<std::int32_t>(j));
-    }
-    std::sort(list.begin(), list.end());
-    if (const auto twice = std::adjacent_find(list.begin(), list.end()); twice != list.end())
-      in.fail(path, fmt::format("entry {} of particle {} twice", *twice, i), "each neighbor once");
-  }
-  return lists;
-}
-
-/// A list that has each pair once, as many codes keep it, would read as one that misses half of them.
-void require_both_directions(const Hdf5Reader& in, const std::string& path,
-                             const std::vector<std::vector<std::int32_t>>& lists) {
-  std::int64_t entries = 0;
-  for (std::size_t i = 0; i < lists.size(); ++i)
-    for (const std::int32_t j : lists[i]) {
-      ++entries;
-      const auto& back = lists[static_cast<std::size_t>(j)];
-      if (std::binary_search(back.begin(), back.end(), static_cast<std::int32_t>(i))) return;
-    }
-  if (entries > 1)
-    in.fail(path, fmt::format("{} pairs, none of them in both lists", entries),
-            "every pair in the lists of both its particles; a half list has to be written out");
+  const IdVector entries = in.integers(path, checked_entries(count, targets, refuse));
+  return checked_lists(count, entries, targets, of_fluid, refuse);
 }
 
 }  // namespace
@@ -102,7 +69,6 @@ Result measure_series(const Fixture& fixture, const std::filesystem::path& serie
         in.fail(group + "/built", fmt::format("{}", built), "the substep of one of the states");
       Neighbors listed;
       listed.fluid = read_lists(in, group + "/fluid", n, n, true);
-      require_both_directions(in, group + "/fluid", listed.fluid);
       listed.wall = read_lists(in, group + "/wall", n, walls.size(), false);
       list = lists.emplace(used[k], StaleList(scene, volumes.volume, then->second, std::move(listed))).first;
     }

@@ -150,7 +150,7 @@ Row summed_up(const std::string& fixture, const std::vector<Sample>& samples) {
 }
 
 std::string ListChoice::options() const {
-  return interval == 0 ? "" : fmt::format("rebuild={}:skin={}", interval, skin);
+  return interval <= 0 ? "" : fmt::format("rebuild={}:skin={}", interval, skin);
 }
 
 std::vector<ListChoice> all_lists(const std::vector<int>& intervals, const std::vector<double>& skins) {
@@ -194,7 +194,8 @@ Result measure(const Fixture& fixture, const Plan& plan, const ListMaker& make_l
   result.support_radius = scene.support_radius();
   result.particles = fixture.state.size();
 
-  const auto states = run_window(fixture, walls, *make_list(""), plan.window);
+  const auto states =
+      run_window(fixture, walls, *make_list(plan.chooses ? complete_list : own_list, false), plan.window);
   std::vector<Build> builds = builds_of(plan);
   std::mutex mutex;
   const std::size_t all = states.size() + builds.size();
@@ -233,7 +234,8 @@ Result measure(const Fixture& fixture, const Plan& plan, const ListMaker& make_l
   }
   result.safe = safe_intervals(scene, near, plan, builds, fixture.name);
   fit_powers(scene, window, result);
-  if (plan.timed) time_and_follow(fixture, walls, plan.window, make_list, result);
+  if (!plan.chooses) measure_as_it_is(fixture, plan.window, plan.timed, *make_list(own_list, false), result);
+  else if (plan.timed) time_and_follow(fixture, walls, plan.window, make_list, result);
   result.measured_seconds = seconds_since(start);
   return result;
 }

@@ -132,10 +132,14 @@ int read(void* solver, double* position, double* velocity) {
 
 const char* device(void*) { return "one thread of the host"; }
 
-constexpr std::uint32_t everything = 0x1FF;
-const decant_plugin_table table = {
-    DECANT_PLUGIN_ABI, sizeof table, "all-pairs", "fp32",     everything, 0,      create, destroy, load,
-    evaluate,          advance,      read,        last_error, device,     nullptr};
+// Member by member, so that it compiles when the table has grown.
+const decant_plugin_table table = [] {
+  decant_plugin_table t{};
+  t.abi = DECANT_PLUGIN_ABI, t.size = sizeof t, t.name = "all-pairs", t.precision = "fp32", t.offers = 0x1FF;
+  t.create = create, t.destroy = destroy, t.load = load, t.evaluate = evaluate, t.advance = advance, t.read = read;
+  t.last_error = last_error, t.device = device;
+  return t;
+}();
 
 }  // namespace
 
