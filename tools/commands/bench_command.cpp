@@ -280,8 +280,9 @@ void add_bench_command(CLI::App& app, int& exit_status) {
   CLI::App* verb = app.add_subcommand("bench", "time per substep of backends that conform");
   verb->footer(bench_footer);
   verb->add_option("FIXTURE", arguments->fixtures, "recordings (*.h5); default: the small ones");
-  verb->add_option("--backend", arguments->backends,
-                   "reference,reference:all-pairs,brute,…, plugin:PATH; default: all that the executor runs")
+  verb->add_option(
+          "--backend", arguments->backends,
+          "reference,reference:all-pairs,brute,…, plugin:PATH, python:FILE:CLASS; default: all that the executor runs")
       ->delimiter(',')
       ->allow_extra_args(false);
   verb->add_option("--executor", arguments->executor, "auto, cuda or host")->capture_default_str();

@@ -396,7 +396,7 @@ void add_conform_command(CLI::App& app, int& exit_status) {
   verb->add_option("--durations", arguments->durations, "print the so many slowest pairs of backend and recording")
       ->check(CLI::Range(1, 10000));
   verb->add_flag("--list", arguments->list, "print the names of all recordings; judges nothing");
-  verb->add_option("--backend", arguments->backends, "brute,…, plugin:PATH; default: all under test")
+  verb->add_option("--backend", arguments->backends, "brute,…, plugin:PATH, python:FILE:CLASS; default: all under test")
       ->delimiter(',')
       ->allow_extra_args(false);
   verb->add_option("--executor", arguments->executor, "auto, cuda or host")->capture_default_str();

@@ -262,7 +262,7 @@ void add_drift_command(CLI::App& app, int& exit_status) {
       ->capture_default_str();
   verb.add_option("--skins", arguments->skins, "shares of H")->delimiter(',')->capture_default_str();
   verb.add_option("--window", arguments->window, "substeps that are run from each state")->capture_default_str();
-  verb.add_option("--backend", arguments->backend, "list, or plugin:PATH: what is timed and followed")
+  verb.add_option("--backend", arguments->backend, "list, plugin:PATH or python:FILE:CLASS: what is timed and followed")
       ->capture_default_str();
   verb.add_option("--executor", arguments->executor, "cuda, host, or auto: the GPU where there is one")
       ->capture_default_str();

@@ -122,7 +122,8 @@ void run(FuzzArguments& arguments, int& exit_status) {
 void add_fuzz_command(CLI::App& app, int& exit_status) {
   auto arguments = std::make_shared<FuzzArguments>();
   CLI::App& verb = *app.add_subcommand("fuzz", "property-based tests on random scenes; counterexamples are minimised");
-  verb.add_option("--backend", arguments->backends, "NAME, NAME:OPTIONS or plugin:PATH, several by commas")
+  verb.add_option("--backend", arguments->backends,
+                  "NAME, NAME:OPTIONS, plugin:PATH or python:FILE:CLASS, several by commas")
       ->delimiter(',')
       ->capture_default_str();
   verb.add_option("--executor", arguments->executor, "cuda, host, or auto: the GPU where there is one")

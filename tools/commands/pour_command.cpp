@@ -108,7 +108,8 @@ void add_pour_command(CLI::App& app, int& exit_status) {
   auto a = std::make_shared<PourArguments>();
   command->add_option("SCENE", a->scene, "Scene file (JSON)")->required();
   command->add_option("--out", a->out, "Folder for frames.h5, *.xdmf, *.vtkhdf, timeline.h5, csv/")->required();
-  command->add_option("--backend", a->backend, "reference, brute, …, plugin:PATH")->capture_default_str();
+  command->add_option("--backend", a->backend, "reference, brute, …, plugin:PATH, python:FILE:CLASS")
+      ->capture_default_str();
   command->add_option("--executor", a->executor, "auto, cuda or host")->capture_default_str();
   a->flags.add_to(*command);
   command->add_option("--particles", a->particles, "About this many; spacing and all that follows are derived anew");

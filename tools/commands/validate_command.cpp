@@ -145,7 +145,8 @@ void add_validate_command(CLI::App& app, int& exit_status) {
       *app.add_subcommand("validate", "runs cases whose answer is known, analytic or measured, and judges the solver");
   verb.add_option("CASE", arguments->cases, "cases to run; all where none is named");
   verb.add_flag("--list", arguments->list, "prints the cases and ends");
-  verb.add_option("--backend", arguments->backend, "solver: reference, NAME[:OPTIONS] or plugin:PATH")
+  verb.add_option("--backend", arguments->backend,
+                  "solver: reference, NAME[:OPTIONS], plugin:PATH or python:FILE:CLASS")
       ->capture_default_str();
   verb.add_option("--executor", arguments->executor, "cuda, host, or auto: the GPU where there is one")
       ->capture_default_str();
