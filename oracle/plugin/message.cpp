@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 #include <poll.h>
+#include <sched.h>
 #include <sys/socket.h>
 #include <sys/uio.h>
 
@@ -11,6 +12,7 @@
 #include <array>
 #include <cerrno>
 #include <cmath>
+#include <thread>
 
 namespace decant::plugin {
 namespace {
@@ -24,6 +26,20 @@ struct Header {
 constexpr std::uint64_t most_bytes = std::uint64_t{1} << 40;
 
 using Clock = std::chrono::steady_clock;
+
+/// Waking a process up takes longer than a substep of a small scene; where there are cores to spare the reader stays
+/// awake for so long, giving its core to whoever asks.
+constexpr auto awake = std::chrono::milliseconds(10);
+
+/// Until there is something to read, or nobody to wait for any more, or it is worth to sleep.
+void watch(int socket) {
+  static const bool cores_to_spare = std::thread::hardware_concurrency() >= 4;
+  if (!cores_to_spare) return;
+  for (const auto until = Clock::now() + awake; Clock::now() < until; ::sched_yield()) {
+    char next;
+    if (::recv(socket, &next, 1, MSG_PEEK | MSG_DONTWAIT) >= 0 || (errno != EAGAIN && errno != EINTR)) return;
+  }
+}
 
 void receive_all(int socket, char* data, std::size_t size, std::optional<Clock::time_point> end) {
   while (size > 0) {
@@ -74,6 +90,7 @@ Message receive(int socket, std::optional<std::chrono::duration<double>> limit) 
   std::optional<Clock::time_point> end;
   if (limit) end = Clock::now() + std::chrono::duration_cast<Clock::duration>(*limit);
   Header header{};
+  watch(socket);
   receive_all(socket, reinterpret_cast<char*>(&header), sizeof header, end);
   if (header.size > most_bytes) throw Silence("what came is no message");
   Message message{static_cast<Code>(header.code), {}};

@@ -1,10 +1,7 @@
 // The example with a fault, by option: fault=NAME, and in which abilities it offers, offers=BITS. What is compiled
 // with a macro differs in its table.
-#include "oracle/plugin.h"
-
-#define decant_plugin sound_plugin
-#include "oracle/plugin/examples/all_pairs.cpp"
-#undef decant_plugin
+#include "oracle/plugin/examples/all_pairs.hpp"
+#include "oracle/plugin/examples/as_plugin.hpp"
 
 #include <chrono>
 #include <cstdlib>
@@ -15,6 +12,7 @@
 
 namespace {
 
+const decant_plugin_table table = PluginOf<AllPairs>::table("all-pairs");
 std::string fault;
 decant_plugin_table faulty;
 

@@ -1,15 +1,15 @@
 // The example with neighbor lists that are rebuilt every rebuild=N substeps with skin=S; without options at every
 // substep. They are given and not used, so that the run stays that of all pairs. lists=FAULT spoils them.
-#include "oracle/plugin.h"
-
-#define decant_plugin sound_plugin
-#include "oracle/plugin/examples/all_pairs.cpp"
-#undef decant_plugin
+#include "oracle/plugin/examples/all_pairs.hpp"
+#include "oracle/plugin/examples/as_plugin.hpp"
 
 #include <cstdlib>
 #include <sstream>
 
 namespace {
+
+using Plugin = PluginOf<AllPairs>;
+const decant_plugin_table table = Plugin::table("all-pairs");
 
 struct Lists {
   std::int64_t every = 1, built = -1, start = 0;
@@ -68,14 +68,14 @@ int load_listing(void* solver, const decant_scene* scene, const decant_walls* wa
 
 int advance_listing(void* solver, std::int64_t substeps, decant_status* status) {
   for (std::int64_t k = 0; k < substeps && status->bits == 0; ++k) {
-    build_where_due(of(solver));
-    of(solver).step(*status);
+    build_where_due(Plugin::of(solver));
+    Plugin::of(solver).step(*status);
   }
   return 0;
 }
 
 int lists(void* solver, decant_lists* out) {
-  build_where_due(of(solver));
+  build_where_due(Plugin::of(solver));
   out->built = kept.fault == "built" ? kept.built - 1000 : kept.built;
   out->fluid_offsets = kept.fluid_offsets.data();
   out->fluid = kept.fluid.data();

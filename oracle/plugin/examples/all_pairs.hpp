@@ -1,4 +1,6 @@
 // A solver as anybody might have one: reference/README.md in fp32, every particle with every other.
+#pragma once
+
 #include "oracle/plugin.h"
 
 #include <Eigen/Dense>
@@ -6,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <numbers>
+#include <string>
 #include <vector>
 
 using Vec = Eigen::Vector3f;
@@ -25,6 +28,7 @@ struct WallMotion {
 };
 
 struct AllPairs {
+  static constexpr std::uint32_t offers = 0x1FF;  // all but lists
   decant_scene s{};
   float H = 0, h = 0, m = 0;
   std::vector<Vec> x, v, wall_local, wall_x, wall_v;
@@ -89,7 +93,7 @@ struct AllPairs {
     }
     return all;
   }
-  void find_densities() {
+  void place_walls() {
     const auto walls = motions(substep);
     wall_x.resize(volume.size()), wall_v.resize(volume.size());
     for (std::size_t b = 0; b < volume.size(); ++b) {
@@ -97,8 +101,13 @@ struct AllPairs {
       wall_x[b] = wall.rotation * wall_local[b] + wall.translation;
       wall_v[b] = wall.velocity_at(wall_x[b]);
     }
+  }
+  void resize_fields() {
     density.assign(x.size(), m * W(0)), pressure.resize(x.size());
     for (auto* counts : {&fluid_count, &fluid_sum, &wall_count, &wall_sum}) counts->assign(x.size(), 0);
+  }
+  void find_densities() {
+    place_walls(), resize_fields();
     for (std::size_t i = 0; i < x.size(); ++i) {
       near(x[i], x, [&](std::size_t j, const Vec&, float r) {
         if (j == i) return;
@@ -128,6 +137,10 @@ struct AllPairs {
       });
     }
   }
+  /// False: there is no such option.
+  bool option(const std::string&, const std::string&) { return false; }
+  void loaded() {}
+  const char* device_name() const { return "one thread of the host"; }
   Vec acceleration(std::size_t i) const {
     const Parts& a = parts[i];
     return a.pressure + a.viscous + a.wall_pressure + a.wall_viscous + WallMotion::vec(s.gravity);
