@@ -45,6 +45,8 @@ def checked(values: Any, shape: tuple[int, ...], dtype: type, what: str) -> np.n
         raise TypeError(f"{what}: {error}") from None
     if array.shape != shape:
         raise ValueError(f"{what} has shape {list(array.shape)}, not {list(shape)}")
+    if array.dtype.kind == "V" and array.dtype.names is None:  # bfloat16 and its like, of ml_dtypes
+        array = array.astype(np.float64)
     kinds = "iu" if dtype is np.int64 else "fiu"
     if array.size and array.dtype.kind not in kinds:
         raise TypeError(f"{what} has dtype {array.dtype}, not {'integers' if kinds == 'iu' else 'reals'}")
