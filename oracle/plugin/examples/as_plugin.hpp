@@ -108,8 +108,7 @@ struct PluginOf : Solver {
     for (std::size_t i = 0; i < n && given && given->pressure; ++i)
       p.pressure[i] = static_cast<float>(given->pressure[i]);
     p.find_forces();
-    std::ranges::copy(p.volume, out->boundary_volume);
-    std::ranges::copy(p.density, out->density);
+    std::ranges::copy(p.volume, out->boundary_volume), std::ranges::copy(p.density, out->density);
     std::ranges::copy(p.fluid_count, out->fluid_neighbor_count);
     std::ranges::copy(p.fluid_sum, out->fluid_neighbor_id_sum);
     std::ranges::copy(p.wall_count, out->wall_neighbor_count);

@@ -1,8 +1,7 @@
 // The sums over pairs on a GPU, from neighbor lists that are rebuilt every rebuild=N substeps with skin=S (a share of
 // H); walls, contact and integration as in all_pairs.hpp and as_plugin.hpp. From the project's folder:
-//   nvcc -std=c++20 -O3 -arch=sm_90 -Xcompiler -fPIC -shared -I. -I/usr/include/eigen3 \
-//     oracle/plugin/examples/cuda_lists.cu -o cuda_lists.so
-//   decant conform --backend plugin:./cuda_lists.so
+//   nvcc -std=c++20 -O3 -arch=sm_90 -Xcompiler -fPIC -shared -I. -I/usr/include/eigen3 -o cuda_lists.so
+//     oracle/plugin/examples/cuda_lists.cu
 #define EIGEN_NO_CUDA
 #include "oracle/plugin/examples/all_pairs.hpp"
 #include "oracle/plugin/examples/as_plugin.hpp"
@@ -13,7 +12,6 @@
 #include <thrust/host_vector.h>
 
 #include <cstdlib>
-#include <cstring>
 #include <stdexcept>
 
 template <class T>
@@ -50,7 +48,7 @@ struct CudaLists : AllPairs {
   Device<float2> rho_p_;
   Device<Sums> sums_;
   Lists fluid_, walls_;
-  std::string name;
+  cudaDeviceProp device{};
 
   bool option(const std::string& key, const std::string& value) {
     if (key == "rebuild") every = std::atoi(value.c_str());
@@ -58,11 +56,7 @@ struct CudaLists : AllPairs {
     else return false;
     return every > 0 && skin >= 0;
   }
-  const char* device_name() {
-    cudaDeviceProp properties;
-    name = cudaGetDeviceProperties(&properties, 0) == cudaSuccess ? properties.name : "no CUDA device";
-    return name.c_str();
-  }
+  const char* device_name() { return cudaGetDeviceProperties(&device, 0) == 0 ? device.name : "no CUDA device"; }
   void loaded() {
     start = substep, built = -1;
     c = {s.kernel,
@@ -135,7 +129,9 @@ struct CudaLists : AllPairs {
                                   raw(walls_.count), raw(walls_.entries), raw(sums_));
     check();
     const thrust::host_vector<Sums> sums = sums_;
-    for (std::size_t i = 0; i < x.size(); ++i) std::memcpy(&parts[i], &sums[i].pressure, sizeof parts[i]);
+    const auto vec = [](float3 a) { return Vec(a.x, a.y, a.z); };
+    for (std::size_t i = 0; i < x.size(); ++i)
+      parts[i] = {vec(sums[i].pressure), vec(sums[i].viscous), vec(sums[i].wall_pressure), vec(sums[i].wall_viscous)};
   }
 
   void lists(decant_lists& out) {

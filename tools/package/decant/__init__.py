@@ -23,13 +23,16 @@ from .model import (
     State,
     Walls,
 )
+from .own import Bound, OwnVerdict, diagnose, judge, spread
 from .port import OFFERS, Port
+from .properties import Property, kernel_properties, properties, repels
 from .reports import Fixture, Report, Row, read_columns, read_fixture, read_report, recordings, to_pandas
 from .verbs import Campaign, Drift, bench, conform, diff, drift, fuzz
 
 __all__ = [
-    "COUNT_FIELDS", "OFFERS", "REAL_FIELDS", "BackendError", "Campaign", "CommandError", "Drift", "Fixture", "Given",
-    "InputError", "Lists", "Oracle", "Port", "Pose", "Report", "Row", "Scene", "StageTimes", "State", "Walls",
-    "bench", "conform", "diff", "drift", "fixture_folder", "fuzz", "include_folder", "on_host", "read_columns",
-    "read_fixture", "read_report", "recordings", "scene_folder", "to_pandas",
+    "COUNT_FIELDS", "OFFERS", "REAL_FIELDS", "BackendError", "Bound", "Campaign", "CommandError", "Drift", "Fixture",
+    "Given", "InputError", "Lists", "Oracle", "OwnVerdict", "Port", "Pose", "Property", "Report", "Row", "Scene",
+    "StageTimes", "State", "Walls", "bench", "conform", "diagnose", "diff", "drift", "fixture_folder", "fuzz",
+    "include_folder", "judge", "kernel_properties", "on_host", "properties", "read_columns", "read_fixture",
+    "read_report", "recordings", "repels", "scene_folder", "spread", "to_pandas",
 ]  # fmt: skip
