@@ -31,14 +31,16 @@ using Clock = std::chrono::steady_clock;
 /// awake for so long, giving its core to whoever asks.
 constexpr auto awake = std::chrono::milliseconds(10);
 
-/// Until there is something to read, or nobody to wait for any more, or it is worth to sleep.
-void watch(int socket) {
+/// What is there to read before it is worth to sleep, at most `size` bytes; 0: nothing yet. Throws where nobody is left.
+std::size_t receive_soon(int socket, char* data, std::size_t size) {
   static const bool cores_to_spare = std::thread::hardware_concurrency() >= 4;
-  if (!cores_to_spare) return;
+  if (!cores_to_spare) return 0;
   for (const auto until = Clock::now() + awake; Clock::now() < until; ::sched_yield()) {
-    char next;
-    if (::recv(socket, &next, 1, MSG_PEEK | MSG_DONTWAIT) >= 0 || (errno != EAGAIN && errno != EINTR)) return;
+    const ssize_t got = ::recv(socket, data, size, MSG_DONTWAIT);
+    if (got > 0) return static_cast<std::size_t>(got);
+    if (got == 0 || (errno != EAGAIN && errno != EINTR)) throw Silence("the other end is gone");
   }
+  return 0;
 }
 
 void receive_all(int socket, char* data, std::size_t size, std::optional<Clock::time_point> end) {
@@ -89,13 +91,21 @@ void send(int socket, const Message& message) {
 Message receive(int socket, std::optional<std::chrono::duration<double>> limit) {
   std::optional<Clock::time_point> end;
   if (limit) end = Clock::now() + std::chrono::duration_cast<Clock::duration>(*limit);
+  // Requests and answers alternate, so that what comes is of one message; most are small and come at once.
+  std::array<char, 4096> first;
+  std::size_t there = receive_soon(socket, first.data(), first.size());
   Header header{};
-  watch(socket);
-  receive_all(socket, reinterpret_cast<char*>(&header), sizeof header, end);
-  if (header.size > most_bytes) throw Silence("what came is no message");
+  if (there < sizeof header) {
+    receive_all(socket, first.data() + there, sizeof header - there, end);
+    there = sizeof header;
+  }
+  std::memcpy(&header, first.data(), sizeof header);
+  if (header.size > most_bytes || there - sizeof header > header.size) throw Silence("what came is no message");
   Message message{static_cast<Code>(header.code), {}};
   message.bytes.resize(static_cast<std::size_t>(header.size));
-  receive_all(socket, message.bytes.data(), message.bytes.size(), end);
+  const std::size_t body = there - sizeof header;
+  std::memcpy(message.bytes.data(), first.data() + sizeof header, body);
+  receive_all(socket, message.bytes.data() + body, message.bytes.size() - body, end);
   return message;
 }
 
