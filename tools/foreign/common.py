@@ -113,6 +113,7 @@ class Table:
             if done.returncode not in (0, 1):
                 sys.exit(f"decant conform ends with {done.returncode}: {done.stderr or done.stdout}")
             with h5py.File(report) as file:
+                self.about["provenance"] = {"git_revision": file["provenance"].attrs["git_revision"].decode()}
                 summary = {key: file["summary/" + key][:] for key in ("field", "verdict", *COLUMNS)}
         rows = {name.decode(): {"verdict": summary["verdict"][k].decode()} |
                 {key: float(summary[key][k]) for key in COLUMNS}
