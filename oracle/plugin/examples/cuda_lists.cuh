@@ -8,10 +8,10 @@ struct Constants {
   float H, h, m, rho0, mu, mu_w, period[3];
 };
 
-struct Sums {
-  float density;
-  int fluid_count, wall_count;
+struct Sums {  // no padding, which nobody would write
   long long fluid_sum, wall_sum;
+  float density;
+  int fluid_count, wall_count, unused;
   float3 pressure, viscous, wall_pressure, wall_viscous;
 };
 
@@ -61,7 +61,7 @@ __global__ void sum_densities(Constants c, int capacity, int wall_capacity, int 
                               const int* wall_count, const int* walls, Sums* out) {
   const int i = blockIdx.x * blockDim.x + threadIdx.x;
   if (i >= n) return;
-  Sums s{c.m * W(c, 0), 0, 0, 0, 0, {}, {}, {}, {}};
+  Sums s{0, 0, c.m * W(c, 0), 0, 0, 0, {}, {}, {}, {}};
   for (int k = 0; k < count[i]; ++k) {
     const int j = list[i * capacity + k];
     const float r2 = squared(minus(c, x[i], x[j]));
