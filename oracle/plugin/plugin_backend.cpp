@@ -4,6 +4,7 @@
 
 #include "oracle/lists/given_lists.hpp"
 #include "oracle/plugin.h"
+#include "oracle/plugin/field_table.hpp"
 #include "oracle/plugin/flat_scene.hpp"
 #include "oracle/plugin/message.hpp"
 #include "oracle/plugin/process.hpp"
@@ -106,13 +107,11 @@ class PluginBackend : public Backend {
     const std::string answer = ask(Code::evaluate, std::move(request.bytes), "evaluate");
     Unpacker in(answer);
     const Status status = status_of(in);
-    for (auto* values : {&out.boundary_volume, &out.density, &out.pressure}) pack(in, *values);
-    for (auto* values : {&out.acceleration, &out.pressure_acceleration, &out.viscous_acceleration,
-                         &out.wall_pressure_acceleration, &out.wall_viscous_acceleration})
-      pack(in, *values);
-    for (auto* values :
-         {&out.fluid_neighbor_count, &out.fluid_neighbor_id_sum, &out.wall_neighbor_count, &out.wall_neighbor_id_sum})
-      pack(in, *values);
+    for (const plugin::RealField& field : plugin::real_fields) {
+      if (field.scalar) pack(in, out.*field.scalar);
+      else pack(in, out.*field.vector);
+    }
+    for (const plugin::CountField& field : plugin::count_fields) pack(in, out.*field.ours);
     in(bytes_);
     if ((offers_ & Offer::neighbors) && out.fluid_neighbor_count.size() > 0) {
       stats_.mean_fluid = out.fluid_neighbor_count.cast<double>().mean();

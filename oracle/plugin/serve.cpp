@@ -3,6 +3,7 @@
 /// beyond them is an error of the call.
 #include "oracle/plugin/serve.hpp"
 
+#include "oracle/plugin/field_table.hpp"
 #include "oracle/plugin/flat_scene.hpp"
 #include "oracle/plugin/message.hpp"
 #include "reference/state.hpp"
@@ -54,33 +55,6 @@ class Fenced {
   static T mark() { return std::bit_cast<T>(std::uint64_t{0x7ff7dec0de0dec0d}); }
   const char* name_;
   std::vector<T> values_;
-};
-
-/// In the order of the answer.
-struct RealField {
-  const char* name;
-  double* decant_fields::* member;
-  std::size_t components;
-};
-constexpr RealField real_fields[] = {
-    {"boundary_volume", &decant_fields::boundary_volume, 1},
-    {"density", &decant_fields::density, 1},
-    {"pressure", &decant_fields::pressure, 1},
-    {"acceleration", &decant_fields::acceleration, 3},
-    {"pressure_acceleration", &decant_fields::pressure_acceleration, 3},
-    {"viscous_acceleration", &decant_fields::viscous_acceleration, 3},
-    {"wall_pressure_acceleration", &decant_fields::wall_pressure_acceleration, 3},
-    {"wall_viscous_acceleration", &decant_fields::wall_viscous_acceleration, 3},
-};
-struct CountField {
-  const char* name;
-  std::int64_t* decant_fields::* member;
-};
-constexpr CountField count_fields[] = {
-    {"fluid_neighbor_count", &decant_fields::fluid_neighbor_count},
-    {"fluid_neighbor_id_sum", &decant_fields::fluid_neighbor_id_sum},
-    {"wall_neighbor_count", &decant_fields::wall_neighbor_count},
-    {"wall_neighbor_id_sum", &decant_fields::wall_neighbor_id_sum},
 };
 
 class Host {
@@ -167,12 +141,11 @@ class Host {
     fields.fluid = state_.size();
     fields.walls = wall_position_.cols();
     std::vector<Fenced<double>> reals;
-    for (const RealField& field : real_fields) {
-      const std::size_t size = field.member == &decant_fields::boundary_volume ? m : field.components * n;
-      fields.*field.member = reals.emplace_back(field.name, size, nan).data();
-    }
+    for (const plugin::RealField& field : plugin::real_fields)
+      fields.*field.theirs = reals.emplace_back(field.name, field.size(n, m), nan).data();
     std::vector<Fenced<std::int64_t>> counts;
-    for (const CountField& field : count_fields) fields.*field.member = counts.emplace_back(field.name, n, -1).data();
+    for (const plugin::CountField& field : plugin::count_fields)
+      fields.*field.theirs = counts.emplace_back(field.name, n, -1).data();
     decant_status status = no_trouble();
     call(table_.evaluate(solver_, is_given ? &given : nullptr, &fields, &status));
     for (const auto& values : reals) values.require_whole();

@@ -1,5 +1,6 @@
 /// \file
 /// decant.Oracle: the reference solver in this process, and the tolerances that it gives a port.
+#include "oracle/plugin/field_table.hpp"
 #include "oracle/solution/reference_backend.hpp"
 #include "oracle/solution/tolerance.hpp"
 #include "reference/error.hpp"
@@ -19,18 +20,9 @@ namespace {
 
 nb::dict to_dict(const Fields& f) {
   nb::dict out;
-  out["boundary_volume"] = to_numpy(f.boundary_volume);
-  out["density"] = to_numpy(f.density);
-  out["pressure"] = to_numpy(f.pressure);
-  out["acceleration"] = to_numpy(f.acceleration);
-  out["pressure_acceleration"] = to_numpy(f.pressure_acceleration);
-  out["viscous_acceleration"] = to_numpy(f.viscous_acceleration);
-  out["wall_pressure_acceleration"] = to_numpy(f.wall_pressure_acceleration);
-  out["wall_viscous_acceleration"] = to_numpy(f.wall_viscous_acceleration);
-  out["fluid_neighbor_count"] = to_numpy(f.fluid_neighbor_count);
-  out["fluid_neighbor_id_sum"] = to_numpy(f.fluid_neighbor_id_sum);
-  out["wall_neighbor_count"] = to_numpy(f.wall_neighbor_count);
-  out["wall_neighbor_id_sum"] = to_numpy(f.wall_neighbor_id_sum);
+  for (const plugin::RealField& field : plugin::real_fields)
+    out[field.name] = field.scalar ? to_numpy(f.*field.scalar) : to_numpy(f.*field.vector);
+  for (const plugin::CountField& field : plugin::count_fields) out[field.name] = to_numpy(f.*field.ours);
   return out;
 }
 

@@ -1,6 +1,7 @@
 /// \file
 /// A Python object as a plug-in: a table whose functions call its methods. The object (decant/serve.py) has checked
 /// shapes and brought arrays to the host.
+#include "oracle/plugin/field_table.hpp"
 #include "oracle/plugin/serve.hpp"
 #include "tools/package/arrays.hpp"
 #include "tools/package/module.hpp"
@@ -74,24 +75,12 @@ int evaluate(void* solver, const decant_given* given, decant_fields* out, decant
     const auto fields = nb::cast<nb::dict>(self.port.attr("evaluate")(
         array(given ? given->boundary_volume : nullptr, m), array(given ? given->density : nullptr, n),
         array(given ? given->pressure : nullptr, n)));
-    const auto real = [&](const char* name, std::size_t size, double* to) {
-      if (fields.contains(name)) copy_out(nb::cast<Reals>(fields[name]), size, to, name);
-    };
-    const auto integer = [&](const char* name, std::int64_t* to) {
-      if (fields.contains(name)) copy_out(nb::cast<Integers>(fields[name]), n, to, name);
-    };
-    real("boundary_volume", m, out->boundary_volume);
-    real("density", n, out->density);
-    real("pressure", n, out->pressure);
-    real("acceleration", 3 * n, out->acceleration);
-    real("pressure_acceleration", 3 * n, out->pressure_acceleration);
-    real("viscous_acceleration", 3 * n, out->viscous_acceleration);
-    real("wall_pressure_acceleration", 3 * n, out->wall_pressure_acceleration);
-    real("wall_viscous_acceleration", 3 * n, out->wall_viscous_acceleration);
-    integer("fluid_neighbor_count", out->fluid_neighbor_count);
-    integer("fluid_neighbor_id_sum", out->fluid_neighbor_id_sum);
-    integer("wall_neighbor_count", out->wall_neighbor_count);
-    integer("wall_neighbor_id_sum", out->wall_neighbor_id_sum);
+    for (const plugin::RealField& field : plugin::real_fields)
+      if (fields.contains(field.name))
+        copy_out(nb::cast<Reals>(fields[field.name]), field.size(n, m), out->*field.theirs, field.name);
+    for (const plugin::CountField& field : plugin::count_fields)
+      if (fields.contains(field.name))
+        copy_out(nb::cast<Integers>(fields[field.name]), n, out->*field.theirs, field.name);
     take_status(self, status);
   });
 }
