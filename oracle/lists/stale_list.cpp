@@ -25,28 +25,6 @@ std::pair<double, double> farthest_two(const Separation& separation, const Eigen
   return {first, second};
 }
 
-/// Keeps of the listed ones those closer than H now, and counts against all that are.
-void compare(const Separation& separation, double H, const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to,
-             const std::vector<std::vector<std::int32_t>>& listed, const std::vector<std::vector<std::int32_t>>& all,
-             std::vector<std::vector<std::int32_t>>& kept, PairCount& count) {
-  kept.resize(listed.size());
-  std::vector<std::int32_t> lost;
-  for (std::size_t i = 0; i < listed.size(); ++i) {
-    const Vec3 x = from.col(static_cast<Eigen::Index>(i));
-    // Both are ascending, so what is kept is what both hold.
-    kept[i].clear();
-    std::set_intersection(listed[i].begin(), listed[i].end(), all[i].begin(), all[i].end(),
-                          std::back_inserter(kept[i]));
-    count.listed += static_cast<std::int64_t>(listed[i].size());
-    count.within += static_cast<std::int64_t>(all[i].size());
-    if (kept[i].size() == all[i].size()) continue;
-    lost.clear();
-    std::set_difference(all[i].begin(), all[i].end(), listed[i].begin(), listed[i].end(), std::back_inserter(lost));
-    count.missed += static_cast<std::int64_t>(lost.size());
-    for (const auto j : lost) count.deepest = std::max(count.deepest, (H - separation(x, Vec3(to.col(j))).norm()) / H);
-  }
-}
-
 template <class Matrix>
 FieldDeficit deficit(const Matrix& whole, const Matrix& partial, const Matrix& tolerance) {
   FieldDeficit d;
@@ -98,6 +76,28 @@ StaleList::StaleList(const Scene& scene, const Eigen::VectorXd& volumes, const I
       wall_(built.walls.position),
       listed_(std::move(listed)) {}
 
+void compare_lists(const Separation& separation, double H, const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to,
+                   const std::vector<std::vector<std::int32_t>>& listed,
+                   const std::vector<std::vector<std::int32_t>>& all, std::vector<std::vector<std::int32_t>>& kept,
+                   PairCount& count) {
+  kept.resize(listed.size());
+  std::vector<std::int32_t> lost;
+  for (std::size_t i = 0; i < listed.size(); ++i) {
+    const Vec3 x = from.col(static_cast<Eigen::Index>(i));
+    // Both are ascending, so what is kept is what both hold.
+    kept[i].clear();
+    std::set_intersection(listed[i].begin(), listed[i].end(), all[i].begin(), all[i].end(),
+                          std::back_inserter(kept[i]));
+    count.listed += static_cast<std::int64_t>(listed[i].size());
+    count.within += static_cast<std::int64_t>(all[i].size());
+    if (kept[i].size() == all[i].size()) continue;
+    lost.clear();
+    std::set_difference(all[i].begin(), all[i].end(), listed[i].begin(), listed[i].end(), std::back_inserter(lost));
+    count.missed += static_cast<std::int64_t>(lost.size());
+    for (const auto j : lost) count.deepest = std::max(count.deepest, (H - separation(x, Vec3(to.col(j))).norm()) / H);
+  }
+}
+
 void compare_fields(const Scene& scene, const Instant& now, const Fields& actual, Staleness& out) {
   const Fields &whole = now.fields, &allowed = now.tolerance;
   const auto row = [](const Eigen::VectorXd& v) { return Eigen::RowVectorXd(v.transpose()); };
@@ -120,8 +120,9 @@ Staleness StaleList::at(const Instant& now) const {
   std::tie(s.farthest, s.second) = farthest_two(separation, now.state.position, fluid_);
   s.wall_farthest = farthest_two(separation, now.walls.position, wall_).first;
   Neighbors kept;
-  compare(separation, H, now.state.position, now.state.position, listed_.fluid, now.near.fluid, kept.fluid, s.fluid);
-  compare(separation, H, now.state.position, now.walls.position, listed_.wall, now.near.wall, kept.wall, s.wall);
+  compare_lists(separation, H, now.state.position, now.state.position, listed_.fluid, now.near.fluid, kept.fluid,
+                s.fluid);
+  compare_lists(separation, H, now.state.position, now.walls.position, listed_.wall, now.near.wall, kept.wall, s.wall);
   if (s.fluid.missed + s.wall.missed == 0) return s;
   Fields stale;
   evaluate<double>(scene_, now.state, now.walls, volumes_, kept, stale);

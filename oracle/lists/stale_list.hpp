@@ -23,6 +23,13 @@ struct PairCount {
   double deepest = 0;       // (H − r)/H of the deepest one missed
 };
 
+/// Keeps of the listed pairs those closer than H now, and counts against all that are; adds to `count`. All lists are
+/// ascending. \param H  m; \param from, to  3×n, m
+void compare_lists(const Separation& separation, double H, const Eigen::Matrix3Xd& from, const Eigen::Matrix3Xd& to,
+                   const std::vector<std::vector<std::int32_t>>& listed,
+                   const std::vector<std::vector<std::int32_t>>& all, std::vector<std::vector<std::int32_t>>& kept,
+                   PairCount& count);
+
 /// How far one field is from the one with all pairs.
 struct FieldDeficit {
   double relative_rms = 0;  // RMS of the error over RMS of the field

@@ -9,7 +9,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <iterator>
 
 namespace decant::drift {
 namespace {
@@ -64,38 +63,27 @@ Seen see(const Fixture& fixture, const Walls& walls, Backend& backend, int windo
   return seen;
 }
 
-struct Missed {
-  std::int64_t within = 0, missed = 0;
-  void add(const std::vector<std::vector<std::int32_t>>& near, const std::vector<std::vector<std::int32_t>>& listed) {
-    std::vector<std::int32_t> kept;
-    for (std::size_t i = 0; i < near.size(); ++i) {
-      kept.clear();
-      std::ranges::set_intersection(near[i], listed[i], std::back_inserter(kept));
-      within += static_cast<std::int64_t>(near[i].size());
-      missed += static_cast<std::int64_t>(near[i].size() - kept.size());
-    }
-  }
-  double share() const { return within > 0 ? static_cast<double>(missed) / static_cast<double>(within) : 0; }
-};
-
 }  // namespace
 
 std::array<double, 2> missed_of_given_lists(const Fixture& fixture, const Walls& walls, Backend& backend, int window) {
-  Missed fluid, wall;
+  const Separation separation(fixture.scene.domain);
+  const double H = fixture.scene.support_radius();
+  PairCount fluid, wall;
   std::vector<ParticleState> states;
+  std::vector<std::vector<std::int32_t>> kept;
   walk(fixture, walls, backend, window, states, [&] {
     Neighbors listed, near;
     (void)build_of(backend, states, backend.lists(listed));
     const ParticleState& now = states.back();
     const PosedWalls posed = pose_walls(fixture.scene, walls, fixture.scene.time_at(now.substep));
     find_neighbors(fixture.scene, now.position, posed.position, NeighborSearch::cells, near);
-    fluid.add(near.fluid, listed.fluid);
-    wall.add(near.wall, listed.wall);
+    compare_lists(separation, H, now.position, now.position, listed.fluid, near.fluid, kept, fluid);
+    compare_lists(separation, H, now.position, posed.position, listed.wall, near.wall, kept, wall);
   });
-  const double of_wall = wall.share();
-  fluid.within += wall.within;
-  fluid.missed += wall.missed;
-  return {fluid.share(), of_wall};
+  const auto share = [](std::int64_t missed, std::int64_t within) {
+    return within > 0 ? static_cast<double>(missed) / static_cast<double>(within) : 0;
+  };
+  return {share(fluid.missed + wall.missed, fluid.within + wall.within), share(wall.missed, wall.within)};
 }
 
 void measure_as_it_is(const Fixture& fixture, int window, bool timed, Backend& backend, Result& result) {
