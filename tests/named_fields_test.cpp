@@ -3,6 +3,7 @@
 /// by term, and where it states none nothing passes.
 #include "oracle/files/named_fields.hpp"
 
+#include "oracle/files/hdf5_handle.hpp"
 #include "tests/results_fixture.hpp"
 
 #include <cmath>
@@ -76,6 +77,95 @@ TEST_F(NamedFields, OfAPortInDoubleAreBoundByBothSidesRounding) {
   const double bound = (10 + 8) * (0x1p-53 + 0x1p-53) * 10;
   EXPECT_EQ(status_off_by(0.9 * bound), 0);
   EXPECT_EQ(status_off_by(1.1 * bound), 1);
+}
+
+/// A reference in single precision rounds as its port does.
+TEST_F(NamedFields, AreBoundByWhatTheReferenceSaysOfItsOwnPrecision) {
+  reference([&](Hdf5Writer& out) {
+    out.vector("/fields/x", x_, "");
+    out.vector("/condition/x", Eigen::VectorXd::Constant(4, 10.0), "");
+    out.attribute("/condition/x", "terms", 100);
+    out.attribute("/condition/x", "reference_precision", 0x1p-24);
+  });
+  const double bound = (10 + 8) * (0x1p-24 + 0x1p-24) * 10;
+  EXPECT_EQ(status_off_by(0.999 * bound), 0);
+  EXPECT_EQ(status_off_by(1.001 * bound), 1);
+}
+
+TEST_F(NamedFields, MayHaveATolerancePerValue) {
+  Eigen::VectorXd each(4);
+  each << 0, 0, 0.5, 0;
+  reference([&](Hdf5Writer& out) {
+    out.vector("/fields/x", x_, "");
+    out.vector("/tolerance/x", each, "");
+    out.attribute("/fields/x", "tolerance", 0.25);
+  });
+  EXPECT_EQ(status_off_by(0.7499), 0);
+  EXPECT_EQ(status_off_by(0.7501), 1);
+  each[2] = -1;
+  reference([&](Hdf5Writer& out) {
+    out.vector("/fields/x", x_, "");
+    out.vector("/tolerance/x", each, "");
+  });
+  expect_refused(judged, "/tolerance/x");
+  reference([&](Hdf5Writer& out) {
+    out.vector("/fields/x", x_, "");
+    out.attribute("/fields/x", "tolerance", 0.25);
+    out.vector("/tolerance/y", each, "");
+  });
+  expect_refused(judged, "/tolerance/y");
+}
+
+/// One per particle counts for all its components.
+TEST_F(NamedFields, OfVectorsMayHaveATolerancePerParticle) {
+  const Eigen::Matrix3Xd v = Eigen::Matrix3Xd::Constant(3, 2, 1.0);
+  reference([&](Hdf5Writer& out) {
+    out.matrix3("/fields/v", v, "");
+    out.vector("/tolerance/v", Eigen::Vector2d(0, 0.5), "");
+  });
+  const auto off = [&](Eigen::Index particle) {
+    Eigen::Matrix3Xd other = v;
+    other(2, particle) += 0.4;
+    port([&](Hdf5Writer& out) { out.matrix3("/fields/v", other, ""); });
+    return judged().status;
+  };
+  EXPECT_EQ(off(0), 1);
+  EXPECT_EQ(off(1), 0);
+}
+
+void put_shaped(Hdf5Writer& out, const std::string& path, const std::vector<hsize_t>& shape,
+                const Eigen::VectorXd& values) {
+  const Handle creation(H5Pcreate(H5P_DATASET_CREATE));
+  const Handle made = make_dataset(out.id(), path, H5T_NATIVE_DOUBLE, shape, creation);
+  H5Dwrite(made.get(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data());
+}
+
+TEST_F(NamedFields, MayBeTensors) {
+  Eigen::VectorXd stress = Eigen::VectorXd::LinSpaced(18, 1, 18);
+  reference([&](Hdf5Writer& out) {
+    put_shaped(out, "/fields/stress", {2, 3, 3}, stress);
+    out.attribute("/fields/stress", "tolerance", 0.25);
+    put_shaped(out, "/position", {2, 2}, Eigen::Vector4d(1, 2, 3, 4));
+  });
+  port([&](Hdf5Writer& out) { put_shaped(out, "/fields/stress", {2, 3, 3}, stress); });
+  EXPECT_EQ(judged().status, 0);
+  EXPECT_EQ(row_of(judged(), "fields", "stress").n, 18);
+  stress[9 + 5] += 1;
+  port([&](Hdf5Writer& out) { put_shaped(out, "/fields/stress", {2, 3, 3}, stress); });
+  const ResultsOutcome outcome = judged();
+  EXPECT_EQ(outcome.status, 1);
+  const CheckRow& row = row_of(outcome, "fields", "stress");
+  EXPECT_EQ(row.worst_id, 1);
+  EXPECT_EQ(row.worst_component, -1);
+  EXPECT_EQ(row.reason, "beyond tolerance at entry [1,2]");
+  EXPECT_EQ(row.worst_x, 3);
+  EXPECT_EQ(row.worst_y, 4);
+  EXPECT_EQ(row.worst_z, 0);
+  EXPECT_NE(outcome.table.find("    actual 16, expected 15; at (3, 4, 0) m"), std::string::npos) << outcome.table;
+  port([&](Hdf5Writer& out) { put_shaped(out, "/fields/stress", {2, 9}, stress); });
+  expect_refused(judged, "/fields/stress");
+  port([&](Hdf5Writer& out) { put_shaped(out, "/fields/stress", {2, 3, 1025}, Eigen::VectorXd::Zero(6150)); });
+  expect_refused(judged, "/fields/stress");
 }
 
 TEST_F(NamedFields, MayBeSoLargeThatTheirSquaresOverflow) {

@@ -82,7 +82,7 @@ TEST(PluginLists, AreNotNeededToSeeFields) {
     return result.rows.front();
   };
   const drift::Row sound = row_of("all_pairs", ""), wrong = row_of("faulty", ":fault=wrong"),
-                   nan = row_of("faulty", ":fault=nan");
+                   no_number = row_of("faulty", ":fault=nan");
   EXPECT_TRUE(std::isnan(sound.missed_share));
   EXPECT_TRUE(std::isnan(sound.own_missed_share));
   EXPECT_GT(sound.density_rms, 0);
@@ -90,8 +90,8 @@ TEST(PluginLists, AreNotNeededToSeeFields) {
   EXPECT_LE(sound.density_score, 1);
   EXPECT_LE(sound.acceleration_score, 1);
   EXPECT_GT(wrong.acceleration_score, 10);
-  EXPECT_TRUE(std::isnan(nan.density_rms));
-  EXPECT_FALSE(nan.density_score <= 1);
+  EXPECT_TRUE(std::isnan(no_number.density_rms));
+  EXPECT_FALSE(no_number.density_score <= 1);
 }
 
 struct ListFault {

@@ -119,14 +119,14 @@ TEST(Plugin, ThatCrashesInOneCheckIsAskedTheOthers) {
     EXPECT_EQ(worst.at(check), Verdict::fail) << check;
 }
 
-struct Fault {
+struct PluginFault {
   const char* name;
   const char* check;   // that fails
   const char* reason;  // part of it
 };
-void PrintTo(const Fault& fault, std::ostream* out) { *out << fault.name; }
+void PrintTo(const PluginFault& fault, std::ostream* out) { *out << fault.name; }
 
-class FaultyPlugin : public testing::TestWithParam<Fault> {};
+class FaultyPlugin : public testing::TestWithParam<PluginFault> {};
 
 TEST_P(FaultyPlugin, IsARowThatSaysWhatHappened) {
   const auto [name, check, reason] = GetParam();
@@ -144,14 +144,16 @@ TEST_P(FaultyPlugin, IsARowThatSaysWhatHappened) {
 
 INSTANTIATE_TEST_SUITE_P(
     Each, FaultyPlugin,
-    testing::Values(
-        Fault{"crash", "run", "advance by 1 at substep 0, 380 particles: its process was ended by signal 6"},
-        Fault{"throws", "run", "evaluate: nobody catches this"},
-        Fault{"leaves", "run", "its process left with exit status 7"},
-        Fault{"hangs", "run", "no answer within 2 s; ended"}, Fault{"beyond", "run", "wrote beyond density"},
-        Fault{"before", "run", "wrote before fluid_neighbor_count"}, Fault{"error", "run", "evaluate: out of luck"},
-        Fault{"nan", "density", ""}, Fault{"unwritten", "pressure", ""},
-        Fault{"wrong", "evaluation", "beyond tolerance"}, Fault{"short", "substep", "beyond tolerance"}),
+    testing::Values(PluginFault{"crash", "run",
+                                "advance by 1 at substep 0, 380 particles: its process was ended by signal 6"},
+                    PluginFault{"throws", "run", "evaluate: nobody catches this"},
+                    PluginFault{"leaves", "run", "its process left with exit status 7"},
+                    PluginFault{"hangs", "run", "no answer within 2 s; ended"},
+                    PluginFault{"beyond", "run", "wrote beyond density"},
+                    PluginFault{"before", "run", "wrote before fluid_neighbor_count"},
+                    PluginFault{"error", "run", "evaluate: out of luck"}, PluginFault{"nan", "density", ""},
+                    PluginFault{"unwritten", "pressure", ""}, PluginFault{"wrong", "evaluation", "beyond tolerance"},
+                    PluginFault{"short", "substep", "beyond tolerance"}),
     [](const auto& instance) { return std::string(instance.param.name); });
 
 TEST(Plugin, IsOnlyAskedForWhatItOffers) {

@@ -17,12 +17,12 @@ namespace decant::test {
 namespace {
 
 constexpr double pi = std::numbers::pi;
-constexpr double radius = 0.05, height = 0.1, thickness = 0.04;  // m, the cup
+constexpr double cup_radius = 0.05, cup_height = 0.1, cup_thickness = 0.04;  // m
 
 Scene cup_scene(double level) {
   Scene scene = open_scene();
   scene.particle_spacing = 0.005;
-  scene.containers = {{"cup", cup_shape(radius, height, thickness), Vec3(0.2, 0, 0.1), thickness, {}}};
+  scene.containers = {{"cup", cup_shape(cup_radius, cup_height, cup_thickness), Vec3(0.2, 0, 0.1), cup_thickness, {}}};
   scene.fills = {{"cup", level, {}, Vec3(1, 2, 3)}};
   return scene;
 }
@@ -52,8 +52,8 @@ Scene slab_scene(int layers, KernelFamily family) {
 /// Depth under the cup's nearest face, counted along the axes where two faces meet, m.
 double depth_in_cup(const Vec3& x) {
   const double r = std::hypot(x.x(), x.y()), z = x.z();
-  const double from_cavity = std::max(r - radius, -z);
-  return std::min({from_cavity, radius + thickness - r, z + thickness, height - z});
+  const double from_cavity = std::max(r - cup_radius, -z);
+  return std::min({from_cavity, cup_radius + cup_thickness - r, z + cup_thickness, cup_height - z});
 }
 
 TEST(CupWalls, LieInLayersHalfASpacingUnderEverySurface) {
@@ -76,10 +76,10 @@ TEST(CupWalls, AreAsManyAsTheirLayersHaveRoomFor) {
   const Scene scene = cup_scene(0.06);
   double area = 0;  // of the outline inset by each layer's depth, turned about the axis
   for (const double d : {0.5 * scene.particle_spacing, 1.5 * scene.particle_spacing}) {
-    const double inner = radius + d, outer = radius + thickness - d;
-    area += pi * outer * outer + 2 * pi * outer * (height + thickness - 2 * d);  // bottom, side
-    area += pi * (outer * outer - inner * inner);                                // rim
-    area += 2 * pi * inner * height + pi * inner * inner;                        // cavity
+    const double inner = cup_radius + d, outer = cup_radius + cup_thickness - d;
+    area += pi * outer * outer + 2 * pi * outer * (cup_height + cup_thickness - 2 * d);  // bottom, side
+    area += pi * (outer * outer - inner * inner);                                        // rim
+    area += 2 * pi * inner * cup_height + pi * inner * inner;                            // cavity
   }
   const double expected = area / std::pow(scene.particle_spacing, 2);
   const auto count = static_cast<double>(sample_walls(scene).size());
@@ -93,7 +93,7 @@ TEST(CupWalls, LeaveNoHoleUnderTheCavitysSurface) {
   for (const auto& u : on.colwise()) {
     const double angle = 2 * pi * u.x();
     const bool bottom = u.y() < 0.3;
-    const double r = bottom ? radius * std::sqrt(u.z()) : radius, z = bottom ? 0 : height * u.z();
+    const double r = bottom ? cup_radius * std::sqrt(u.z()) : cup_radius, z = bottom ? 0 : cup_height * u.z();
     const Vec3 x(r * std::cos(angle), r * std::sin(angle), z);
     // The farthest point of a cubic lattice's face: half a spacing along each axis.
     const double nearest = (wall.colwise() - x).colwise().norm().minCoeff();
@@ -173,8 +173,9 @@ TEST(TankWalls, AreTheLatticeCellsOfTheSolidThatAreFewLayersDeep) {
 }
 
 TEST(RenderSurface, LiesOnTheSolidAndHasItsArea) {
-  const double outer = radius + thickness;
-  const double cup_area = 2 * pi * outer * outer + 2 * pi * outer * (height + thickness) + 2 * pi * radius * height;
+  const double outer = cup_radius + cup_thickness;
+  const double cup_area =
+      2 * pi * outer * outer + 2 * pi * outer * (cup_height + cup_thickness) + 2 * pi * cup_radius * cup_height;
   const double dx = 1.0 / 64;  // outside and top of the tank's 22 × 18 × 14 block, and its cavity
   const double tank_area = dx * dx * (2 * (22 * 14 + 18 * 14 + 22 * 18) + 2 * (10 * 8 + 6 * 8));
   const std::pair<Container, double> cases[] = {{cup_scene(0.06).containers[0], cup_area},
@@ -233,7 +234,7 @@ TEST(CupFill, HasTheVolumeUpToTheLevel) {
     const double volume =
         static_cast<double>(initial_state(scene).size()) * scene.particle_mass() / scene.fluid.rest_density;
     // A layer holds the cells whose centre is dx/2 from the wall; a cell reaches dx/√2 about it.
-    const double least = radius - 0.5 * dx - dx / std::sqrt(2), most = least + dx * std::sqrt(2);
+    const double least = cup_radius - 0.5 * dx - dx / std::sqrt(2), most = least + dx * std::sqrt(2);
     EXPECT_GT(volume, layers * dx * pi * least * least) << level;
     EXPECT_LT(volume, layers * dx * pi * most * most) << level;
   }
@@ -245,7 +246,7 @@ TEST(CupFill, IsALatticeInTheCavityHalfASpacingFromItsSurface) {
   const ParticleState state = initial_state(scene);
   for (Eigen::Index i = 0; i < state.size(); ++i) {
     const Vec3 x = state.position.col(i) - scene.containers[0].origin;
-    EXPECT_LE(std::hypot(x.x(), x.y()), radius - dx / 2 + 1e-7);
+    EXPECT_LE(std::hypot(x.x(), x.y()), cup_radius - dx / 2 + 1e-7);
     const Vec3 cell = x / dx - Vec3::Constant(0.5);
     EXPECT_LT((cell.array() - cell.array().round()).abs().maxCoeff(), 1e-4);
   }

@@ -21,13 +21,21 @@
 
 namespace decant {
 
+namespace hdf5 {
+struct Dataset;
+}
+
 /// File open for reading. Throws InputError where the file is missing, truncated, not HDF5, or
 /// where an object is missing, of the wrong class, rank or length, claims more than the file can
 /// hold, or leads out of the file. The error's key is the dataset's path, or `object@attribute`, or
 /// "file".
 class Hdf5Reader {
  public:
-  explicit Hdf5Reader(std::filesystem::path file);
+  /// Which formats of HDF5 are read: those whose headers carry checksums, or the older one too.
+  enum class Format { checksums, any };
+
+  /// \param called  what messages name in place of the file; empty: the file
+  explicit Hdf5Reader(std::filesystem::path file, Format format = Format::checksums, std::filesystem::path called = {});
   ~Hdf5Reader();
   Hdf5Reader(const Hdf5Reader&) = delete;
   Hdf5Reader& operator=(const Hdf5Reader&) = delete;
@@ -51,6 +59,11 @@ class Hdf5Reader {
   IdVector integers_at(const std::string& path, std::int64_t index) const;
   /// [n] dataset of integers of any width; one beyond int64 is refused.
   IdVector integers(const std::string& path, std::int64_t n = -1) const;
+  /// Values by particle, all of the first, then of the second, …: [n], or [n,K] and [n,K,L] with K or K L values per
+  /// particle, most_components at most.
+  Eigen::VectorXd reals(const std::string& path, std::int64_t n = -1) const;
+  IdVector integer_values(const std::string& path, std::int64_t n = -1) const;
+  static constexpr std::size_t most_components = 1024;
   /// [n] dataset of strings.
   std::vector<std::string> strings(const std::string& path, std::int64_t n = -1) const;
   /// Scalar dataset that holds one string.
@@ -65,11 +78,20 @@ class Hdf5Reader {
   std::int64_t integer_attribute(const std::string& object, const std::string& name) const;
 
   const std::filesystem::path& file() const { return file_; }
+  std::uintmax_t file_size() const { return size_; }
+  /// False of a file in the older format.
+  bool has_checksums() const { return has_checksums_; }
+  /// The file's identifier, for what is not above.
+  hid_t id() const { return id_; }
   /// Throws InputError(file, key, value, bound); for callers that find a value out of bounds.
   [[noreturn]] void fail(const std::string& key, const std::string& value, const std::string& bound) const;
 
  private:
+  IdVector read_integers(const std::string& path, const hdf5::Dataset& data) const;
+
   std::filesystem::path file_;
+  std::uintmax_t size_ = 0;
+  bool has_checksums_ = false;
   hid_t id_ = -1;
 };
 

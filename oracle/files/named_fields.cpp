@@ -2,10 +2,11 @@
 /// States by name, fields by name, particles by id.
 #include "oracle/files/named_fields.hpp"
 
-#include "oracle/files/hdf5_io.hpp"
+#include "oracle/files/foreign_file.hpp"
 #include "oracle/solution/sum_bound.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -16,9 +17,10 @@
 namespace decant {
 namespace {
 
-/// Values by particle, and by component within one.
+/// Values by particle, and by component within one: [N], [N,K] or [N,K,L], the last index fastest.
 struct NamedField {
   Eigen::VectorXd values;
+  std::vector<std::int64_t> shape;
   int components = 1;
   bool integers = false;
   std::string unit;
@@ -26,21 +28,27 @@ struct NamedField {
 
 constexpr double exact_integers = 0x1p53;  // beyond, a double skips some
 
+std::string in_words(const std::vector<std::int64_t>& shape) { return fmt::format("[{}]", fmt::join(shape, ",")); }
+
+/// "[0,2]" of a component of a tensor.
+std::string entry(std::int64_t component, const NamedField& field) {
+  if (field.shape.size() < 3) return fmt::format("[{}]", component);
+  return fmt::format("[{},{}]", component / field.shape[2], component % field.shape[2]);
+}
+
 NamedField read_field(const Hdf5Reader& in, const std::string& path, std::int64_t n) {
   NamedField field;
-  const auto shape = in.shape(path);
-  field.components = shape.size() == 2 ? 3 : 1;
+  field.shape = in.shape(path);
   field.integers = in.holds_integers(path);
-  if (field.components == 3) {
-    field.values = flat(in.matrix3(path, n));
-  } else if (field.integers) {
-    field.values = flat(in.integers(path, n));
+  if (field.integers) {
+    field.values = flat(in.integer_values(path, n));
     for (Eigen::Index k = 0; k < field.values.size(); ++k)
       if (!(std::abs(field.values[k]) <= exact_integers))
         in.fail(path, fmt::format("{:.0f} at {}", field.values[k], k), "within 2^53");
   } else {
-    field.values = in.vector(path, n);
+    field.values = in.reals(path, n);
   }
+  for (std::size_t axis = 1; axis < field.shape.size(); ++axis) field.components *= static_cast<int>(field.shape[axis]);
   if (in.has_attribute(path, "unit")) field.unit = in.text_attribute(path, "unit");
   return field;
 }
@@ -79,6 +87,7 @@ struct State {
   std::int64_t n = 0;
   bool has_ids = false;
   IdVector ids;
+  Eigen::Matrix3Xd position;  // 3×N, 0 along axes that it does not have; empty where it is not there
 
   State(const Hdf5Reader& file, std::string group) : in(file), path(std::move(group)) {
     names = in.children(path + "/fields");
@@ -91,13 +100,22 @@ struct State {
       if (!shape.empty()) n = shape[0];
       ids = IdVector::LinSpaced(n, 0, n - 1);
     }
+    if (in.has(path + "/position")) read_position();
+  }
+  void read_position() {
+    const std::string at = path + "/position";
+    const NamedField found = read_field(in, at, n);
+    if (found.integers || found.components > 3)
+      in.fail(at, found.integers ? "integers" : in_words(found.shape), "reals, [N], [N,2] or [N,3]");
+    position.setZero(3, n);
+    position.topRows(found.components) = found.values.reshaped(found.components, n);
   }
   std::string field(const std::string& name) const { return path + "/fields/" + name; }
   bool has(const std::string& name) const { return std::find(names.begin(), names.end(), name) != names.end(); }
 };
 
-/// (√n + c) (u + 2⁻⁵³) C of every value; empty where the field has no condition sum.
-Eigen::VectorXd derived_tolerance(const State& oracle, const std::string& name, int components) {
+/// (√n + c) (u + u_ref) C of every value; empty where the field has no condition sum.
+Eigen::VectorXd derived_tolerance(const State& oracle, const std::string& name, const NamedField& field) {
   const Hdf5Reader& in = oracle.in;
   const std::string path = oracle.path + "/condition/" + name;
   const std::string terms_path = oracle.path + "/terms/" + name;
@@ -106,11 +124,13 @@ Eigen::VectorXd derived_tolerance(const State& oracle, const std::string& name, 
     return {};
   }
   const NamedField sums = read_field(in, path, oracle.n);
-  if (sums.components != components) in.fail(path, sums.components == 3 ? "[N,3]" : "[N]", "the field's shape");
+  if (sums.shape != field.shape) in.fail(path, in_words(sums.shape), "the field's shape, " + in_words(field.shape));
   require(in, path, sums.values, false);
   const double u = stated(in, path, "precision").value_or(unit_roundoff);
+  const double own = stated(in, path, "reference_precision").value_or(reference_roundoff);
   const double c = stated(in, path, "c").value_or(default_roundings);
   if (!(u > 0 && u < 1)) in.fail(path + "@precision", fmt::format("{:.9g}", u), "in 0 … 1");
+  if (!(own < 1)) in.fail(path + "@reference_precision", fmt::format("{:.9g}", own), "in 0 … 1");
 
   Eigen::VectorXd terms;
   if (in.has(terms_path)) {
@@ -123,8 +143,21 @@ Eigen::VectorXd derived_tolerance(const State& oracle, const std::string& name, 
   }
   Eigen::VectorXd tolerance(sums.values.size());
   for (Eigen::Index k = 0; k < tolerance.size(); ++k)
-    tolerance[k] = (std::sqrt(terms[k / components]) + c) * (u + reference_roundoff) * sums.values[k];
+    tolerance[k] = (std::sqrt(terms[k / field.components]) + c) * (u + own) * sums.values[k];
   return tolerance;
+}
+
+/// STATE/tolerance/NAME, by value or by particle; empty where there is none.
+Eigen::VectorXd given_tolerance(const State& oracle, const std::string& name, const NamedField& field) {
+  const std::string path = oracle.path + "/tolerance/" + name;
+  if (!oracle.in.has(path)) return {};
+  NamedField given = read_field(oracle.in, path, oracle.n);
+  require(oracle.in, path, given.values, false);
+  if (given.shape == field.shape) return given.values;
+  if (given.shape.size() != 1)
+    oracle.in.fail(path, in_words(given.shape),
+                   fmt::format("the field's shape, {}, or one value per particle", in_words(field.shape)));
+  return given.values.transpose().replicate(field.components, 1).reshaped();
 }
 
 /// √(Σx²/count), also where squares overflow.
@@ -137,13 +170,15 @@ double root_mean_square(const Eigen::VectorXd& values) {
 /// tau of every value, or empty where the reference states nothing to judge by.
 Eigen::VectorXd tolerance_of(const State& oracle, const std::string& name, const NamedField& field) {
   const std::string path = oracle.field(name);
-  Eigen::VectorXd tolerance = derived_tolerance(oracle, name, field.components);
+  Eigen::VectorXd tolerance = derived_tolerance(oracle, name, field);
+  const Eigen::VectorXd given = given_tolerance(oracle, name, field);
   const auto absolute = stated(oracle.in, path, "tolerance");
   const auto relative = stated(oracle.in, path, "relative");
   if (tolerance.size() == 0) {
-    if (!absolute && !relative && !field.integers) return {};
+    if (given.size() == 0 && !absolute && !relative && !field.integers) return {};
     tolerance.setZero(field.values.size());
   }
+  if (given.size() > 0) tolerance += given;
   tolerance.array() += absolute.value_or(0) + relative.value_or(0) * root_mean_square(field.values);
   for (Eigen::Index k = 0; k < tolerance.size(); ++k)
     if (!std::isfinite(tolerance[k]))
@@ -164,8 +199,8 @@ void check_field(const State& oracle, const State& port, const Matching& ids, co
     return;
   }
   const NamedField got = read_field(port.in, path, port.n);
-  if (got.components != expected.components)
-    port.in.fail(path, got.components == 3 ? "[N,3]" : "[N]", "the reference's shape");
+  if (!std::equal(got.shape.begin() + 1, got.shape.end(), expected.shape.begin() + 1, expected.shape.end()))
+    port.in.fail(path, in_words(got.shape), "the reference's shape, " + in_words(expected.shape));
   if (!got.unit.empty() && !expected.unit.empty() && got.unit != expected.unit)
     port.in.fail(path + "@unit", got.unit, expected.unit);
   if (!ids.ok()) {
@@ -173,16 +208,25 @@ void check_field(const State& oracle, const State& port, const Matching& ids, co
     return;
   }
   if (tolerance.size() == 0) {
-    row.reason = fmt::format(
-        "{} has no tolerance for it: neither /condition nor @tolerance nor "
-        "@relative",
-        oracle.in.file().filename().string());
+    row.reason =
+        fmt::format("{} has no tolerance for it: neither /condition nor /tolerance nor @tolerance nor @relative",
+                    oracle.in.file().filename().string());
     return;
   }
   const Eigen::Map<const Eigen::MatrixXd> found(got.values.data(), got.components, port.n);
   const Eigen::MatrixXd ordered = found(Eigen::all, ids.place);
   compare({flat(ordered), expected.values, tolerance, {}, expected.components, nullptr, 0}, row);
-  if (row.worst_id >= 0) row.worst_id = oracle.ids[row.worst_id];
+  if (row.worst_id < 0) return;
+  if (expected.components > 3) {
+    if (row.verdict == Verdict::fail) row.reason = "beyond tolerance at entry " + entry(row.worst_component, expected);
+    row.worst_component = -1;
+  }
+  if (oracle.position.size() > 0 && row.verdict == Verdict::fail) {
+    row.worst_x = oracle.position(0, row.worst_id);
+    row.worst_y = oracle.position(1, row.worst_id);
+    row.worst_z = oracle.position(2, row.worst_id);
+  }
+  row.worst_id = oracle.ids[row.worst_id];
 }
 
 void check_state(const State& oracle, const State& port, RowBuilder& builder) {
@@ -193,7 +237,7 @@ void check_state(const State& oracle, const State& port, RowBuilder& builder) {
                  fmt::format("{}, as the reference has", oracle.n));
   if (const Matching own = match_ids(oracle.ids, oracle.ids); !own.ok())
     oracle.in.fail(oracle.path + "/id", own.mismatch, "each id once");
-  for (const char* group : {"/condition", "/terms"})
+  for (const char* group : {"/condition", "/terms", "/tolerance"})
     if (oracle.in.has(oracle.path + group))
       for (const auto& name : oracle.in.children(oracle.path + group))
         if (!oracle.has(name))
@@ -210,7 +254,7 @@ void check_state(const State& oracle, const State& port, RowBuilder& builder) {
 
 CheckedResults check_named_fields(const std::filesystem::path& reference, const std::filesystem::path& results,
                                   const std::string& name) {
-  const Hdf5Reader oracle(reference), port(results);
+  const Hdf5Reader oracle = open_foreign(reference), port = open_foreign(results);
   for (const auto& [in, kind, schema] :
        {std::tuple{&oracle, "decant_reference", reference_schema}, std::tuple{&port, "decant_results", results_schema}})
     if (const std::int64_t found = in->integer_attribute("/", kind); found != schema)

@@ -3,7 +3,7 @@
 #include "oracle/files/results.hpp"
 
 #include "oracle/checks/neighborhood.hpp"
-#include "oracle/files/hdf5_io.hpp"
+#include "oracle/files/foreign_file.hpp"
 #include "reference/sampling.hpp"
 
 #include <fmt/format.h>
@@ -21,7 +21,7 @@ constexpr const char* after_group = "/substep";
 class ResultsReader {
  public:
   ResultsReader(const std::filesystem::path& file, const Fixture& fixture)
-      : in_(file), fixture_(fixture), n_(fixture.state.size()) {
+      : in_(open_foreign(file)), fixture_(fixture), n_(fixture.state.size()) {
     const std::int64_t schema = in_.integer_attribute("/", "decant_results");
     if (schema != results_schema) in_.fail("/@decant_results", std::to_string(schema), std::to_string(results_schema));
     require_fixture();

@@ -86,8 +86,9 @@ std::string details(const CheckRow& row) {
   }
   if (std::isnan(row.worst_x)) return text;
   if (!text.empty()) text += "; ";
-  text += fmt::format("at ({:.6g}, {:.6g}, {:.6g}) m; {} fluid neighbors", row.worst_x, row.worst_y, row.worst_z,
-                      row.fluid_neighbors);
+  text += fmt::format("at ({:.6g}, {:.6g}, {:.6g}) m", row.worst_x, row.worst_y, row.worst_z);
+  if (row.fluid_neighbors < 0) return text;
+  text += fmt::format("; {} fluid neighbors", row.fluid_neighbors);
   if (!row.nearest.empty()) text += ", nearest " + row.nearest;
   return text + fmt::format("; {} wall neighbors", row.wall_neighbors);
 }

@@ -42,7 +42,7 @@ struct CheckRow {
   double median_score = 0;
   double fp32_reference_score = 0;    // score of the oracle's source in sequential fp32; NaN where none
   std::int64_t worst_id = -1;         // a wall particle's where the field is boundary_volume
-  std::int64_t worst_component = -1;  // 0, 1, 2 of a vector
+  std::int64_t worst_component = -1;  // 0, 1, 2 of a vector; of a tensor the reason says it
   /// The worst value and the oracle's, in `unit`; `expected` is no number where a row has none.
   double actual = no_number, expected = no_number;
   /// Where the worst particle is in the fixture, m, and who is nearer than H: filled by `locate`

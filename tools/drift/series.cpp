@@ -1,6 +1,6 @@
 /// \file
 /// Lists of another program, checked as any input, then looked at like our own.
-#include "oracle/files/hdf5_io.hpp"
+#include "oracle/files/foreign_file.hpp"
 #include "oracle/lists/given_lists.hpp"
 #include "reference/error.hpp"
 #include "reference/sampling.hpp"
@@ -29,7 +29,7 @@ std::vector<std::vector<std::int32_t>> read_lists(const Hdf5Reader& in, const st
 
 Result measure_series(const Fixture& fixture, const std::filesystem::path& series) {
   const auto start = std::chrono::steady_clock::now();
-  const Hdf5Reader in(series);
+  const Hdf5Reader in = open_foreign(series);
   if (!in.has_attribute("/", "decant_list_series"))
     in.fail("/@decant_list_series", "missing", "1: a series of states and lists");
   if (const auto schema = in.integer_attribute("/", "decant_list_series"); schema != 1)

@@ -60,7 +60,10 @@ class Checker:
                 self.complain(path, f"shape {list(found)}, expected a scalar")
             return
         if expected == "[N…]":
-            expected = "[N,3]" if len(found) == 2 else "[N]"
+            if not 1 <= len(found) <= 3:
+                self.complain(path, f"shape {list(found)}, expected [N], [N,K] or [N,K,L]")
+                return
+            expected = "[" + ",".join(["N", *map(str, found[1:])]) + "]"
         letters = expected.strip("[]").split(",")
         if len(letters) != len(found):
             self.complain(path, f"shape {list(found)}, expected {expected}")

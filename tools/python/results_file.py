@@ -24,9 +24,9 @@ UNITS = {"boundary_volume": "m^3", "density": "kg/m^3", "pressure": "Pa", "accel
 def pair_sums(n, i, j, terms, kappa=0.0, both=True):
     """Condition sums and their numbers of terms, for a reference file.
 
-    n particles; pair k adds terms[k] ([K] or [K,3]) to particle i[k] and, where `both`, the same
+    n particles; pair k adds terms[k] ([K], [K,3], …) to particle i[k] and, where `both`, the same
     size to j[k]. kappa is a term's own condition, r|f'|/f of a radial f. Returns sum |t|(1 + kappa)
-    in double, [n] or [n,3], and the number of terms, [n].
+    in double, [n], [n,3], …, and the number of terms, [n].
     """
     size = np.abs(np.asarray(terms, np.float64))
     size = size * (1 + np.asarray(kappa, np.float64).reshape((-1,) + (1,) * (size.ndim - 1)))
@@ -35,6 +35,23 @@ def pair_sums(n, i, j, terms, kappa=0.0, both=True):
         np.add.at(sums, np.asarray(index), size)
         np.add.at(count, np.asarray(index), 1)
     return sums, count
+
+
+def near_cutoff(position, radius, period=None, precision=2.0**-24, roundings=8):
+    """Particles that own a pair which fp32 may find on the other side of the cutoff, [n]: their neighbor counts may
+    differ by one. As each=near_cutoff(…) it is the tolerance of such a field.
+
+    position: [n,D], m; radius: m; period: [D], m, 0 where an axis has none. All pairs are compared.
+    """
+    x = np.asarray(position, np.float64)
+    period = np.zeros(x.shape[1]) if period is None else np.asarray(period, np.float64)
+    slack = roundings * precision * (np.abs(x).max(initial=0) + radius)
+    unsure = np.zeros(len(x))
+    for k, place in enumerate(x):
+        apart = x - place
+        apart -= np.where(period > 0, period * np.round(apart / np.where(period > 0, period, 1)), 0)
+        unsure[k] = (np.abs(np.sqrt((apart**2).sum(axis=1)) - radius) <= slack).sum()
+    return unsure
 
 
 def put(group, name, values, unit=None, **attributes):
@@ -86,29 +103,37 @@ def write_results(path, fields=None, staged=None, substep=None, *, states=None, 
 
 
 def field(values, unit=None, *, condition=None, terms=None, precision=None, c=None,
-          tolerance=None, relative=None):
-    """One field of a reference file: see oracle/formats/results.md for what bounds it."""
+          tolerance=None, relative=None, each=None, reference_precision=None):
+    """One field of a reference file: see oracle/formats/results.md for what bounds it.
+
+    tolerance: one for all values; each: one per value or per particle, as of what an earlier stage hands on.
+    """
     return dict(values=values, unit=unit, condition=condition, terms=terms, precision=precision,
-                c=c, tolerance=tolerance, relative=relative)
+                c=c, tolerance=tolerance, relative=relative, each=each,
+                reference_precision=reference_precision)
 
 
-def write_reference(path, fields=None, *, id=None, states=None):
+def write_reference(path, fields=None, *, id=None, position=None, states=None):
     """A reference of one's own: fields = {name: field(…)} of one state, or of several:
-    states = {name: {"fields": {…}, "id": […]}}."""
+    states = {name: {"fields": {…}, "id": […], "position": […]}}. position: m, shown where a value fails."""
     def fill(file):
         file.attrs["decant_reference"] = np.int64(SCHEMA)
-        for state, content in (states or {"": {"fields": fields, "id": id}}).items():
+        for state, content in (states or {"": {"fields": fields, "id": id, "position": position}}).items():
             group = file.require_group(state) if state else file
-            if content.get("id") is not None:
-                put(group, "id", content["id"])
+            for name, unit in (("id", None), ("position", "m")):
+                if content.get(name) is not None:
+                    put(group, name, content[name], unit)
             for name, f in content["fields"].items():
                 put(group, f"fields/{name}", f["values"], f["unit"], tolerance=f["tolerance"],
                     relative=f["relative"])
+                if f["each"] is not None:
+                    put(group, f"tolerance/{name}", np.asarray(f["each"], np.float64), f["unit"])
                 if f["condition"] is None:
                     continue
                 scalar = np.ndim(f["terms"]) == 0
                 put(group, f"condition/{name}", f["condition"], f["unit"], c=f["c"],
-                    precision=f["precision"], terms=f["terms"] if scalar else None)
+                    precision=f["precision"], reference_precision=f["reference_precision"],
+                    terms=f["terms"] if scalar else None)
                 if not scalar:
                     put(group, f"terms/{name}", f["terms"])
     whole_file(path, fill)

@@ -54,7 +54,7 @@ class Row:
     median_score: float
     fp32_reference_score: float  # of the oracle's source in sequential fp32
     worst_id: int  # particle; -1: none
-    worst_component: int  # 0, 1, 2: x, y, z; -1: none
+    worst_component: int  # 0, 1, 2: x, y, z; -1: none, or a tensor, whose entry the reason names
     actual: float
     expected: float
     worst_x: float  # m
@@ -85,9 +85,12 @@ class Row:
                 f"{self.unit}",
                 f"  error {self.error:.4g}, tolerance {self.tolerance:.4g} {self.unit}, score {self.score:.3g}; "
                 f"median score {self.median_score:.3g}",
-                f"  at ({self.worst_x:.6g}, {self.worst_y:.6g}, {self.worst_z:.6g}) m, {self.fluid_neighbors} fluid "
-                f"and {self.wall_neighbors} wall neighbors; nearest {self.nearest or 'none'}",
             ]
+        if self.worst_x == self.worst_x:
+            place = f"  at ({self.worst_x:.6g}, {self.worst_y:.6g}, {self.worst_z:.6g}) m"
+            around = f", {self.fluid_neighbors} fluid and {self.wall_neighbors} wall neighbors"
+            near = f"; nearest {self.nearest or 'none'}"
+            lines.append(place + (around + near if self.fluid_neighbors >= 0 else ""))
         return "\n".join(lines)
 
 
