@@ -6,6 +6,7 @@
 #include "oracle/checks/comparison.hpp"
 #include "oracle/checks/field_checks.hpp"
 #include "oracle/checks/neighborhood.hpp"
+#include "oracle/checks/run_ahead.hpp"
 #include "oracle/checks/run_checks.hpp"
 #include "oracle/checks/status_check.hpp"
 #include "oracle/solution/sum_bound.hpp"
@@ -28,7 +29,7 @@ constexpr std::uint32_t offers_of_evaluate =
     Offer::density | Offer::acceleration | Offer::parts | Offer::neighbors | Offer::boundary_volume;
 
 void run_fields(Backend& backend, const PreparedReference& oracle, RowBuilder& builder) {
-  const std::uint32_t offers = backend.offers();
+  const std::uint32_t offers = backend.offers() & oracle.offers;
   if (!(offers & offers_of_evaluate)) return builder.not_run("fields", not_offered);
   const Answered answered = answered_by(offers);
   const auto n = oracle.own.fields.density.size(), m = oracle.own.fields.boundary_volume.size();
@@ -67,7 +68,7 @@ void run_substep(Backend& backend, const Fixture& fixture, const PreparedReferen
   if (got.substep != fixture.state.substep + 1)
     return builder.failed("substep", fmt::format("is at substep {}, not {}", got.substep, fixture.state.substep + 1));
   check_substep(got, all_answered(), fixture, oracle, builder);
-  check_verified(backend.neighbor_stats().verified, oracle.own, builder);
+  if (oracle.offers & Offer::neighbors) check_verified(backend.neighbor_stats().verified, oracle.own, builder);
 }
 
 /// Recorded against recomputed, both in double: only the last bits may differ between compilers. Tolerances
@@ -139,45 +140,6 @@ std::string ill_posed_reason(const ReferenceSolution& a) {
   return why.empty() ? why : why + "no backend can pass (a lattice? let it move first)";
 }
 
-namespace {
-
-/// Where a run of the fixture is interrupted, whatever is asked of it: the same run every time.
-std::vector<Segment> segments_of(const Fixture& fixture, int sample_every) {
-  const auto substeps = static_cast<int>(fixture.ensemble.substeps);
-  const std::vector<int> viewed = viewed_after(fixture.state.size(), substeps);
-  std::set<int> ends(viewed.begin(), viewed.end());
-  for (int done = sample_every > 0 || viewed.empty() ? 0 : viewed.back(); done < substeps; ends.insert(done)) {
-    const int left = substeps - done;
-    done += sample_every > 0 ? std::min(sample_every, left) : (left + 1) / 2;
-  }
-  std::vector<Segment> all;
-  int last = 0;
-  for (const int end : ends) {
-    all.push_back({end - last, std::ranges::find(viewed, end) != viewed.end()});
-    last = end;
-  }
-  return all;
-}
-
-/// The oracle's own run sampled as a backend's run is.
-void run_ahead(const Fixture& fixture, PreparedReference& prepared) {
-  Solver solver(fixture.scene, prepared.walls, fixture.state);
-  Audit audit(fixture.scene);
-  audit.sample(fixture.state);
-  std::int64_t done = 0;
-  for (const Segment& segment : prepared.segments) {
-    for (int k = 0; k < segment.substeps; ++k) solver.substep();
-    if (4 * done < fixture.ensemble.substeps) ++prepared.repeated;
-    done += segment.substeps;
-    prepared.later_sample = audit.sample(solver.state());
-    prepared.deepest = std::max(prepared.deepest, prepared.later_sample.deepest);
-    prepared.crossed = std::max(prepared.crossed, prepared.later_sample.crossed);
-  }
-  prepared.later = solver.state();
-}
-
-}  // namespace
-
 PreparedReference prepare_reference(const Fixture& fixture, const CheckSelection& checks, int sample_every) {
   const Scene& scene = fixture.scene;
   PreparedReference prepared;
@@ -200,7 +162,13 @@ PreparedReference prepare_reference(const Fixture& fixture, const CheckSelection
   if (wanted({"contact"})) prepared.contact = contact_problems(scene, fixture.state, prepared.own.fields.acceleration);
   const bool runs = wanted({"trajectory", "mass", "containment", "determinism"});
   if (runs || wanted({"advanced"})) prepared.segments = segments_of(fixture, sample_every);
-  if (runs) run_ahead(fixture, prepared);
+  if (runs) {
+    Solver solver(scene, prepared.walls, fixture.state);
+    run_ahead(fixture, prepared, [&](int substeps) {
+      for (int k = 0; k < substeps; ++k) solver.substep();
+      return solver.state();
+    });
+  }
   // Nobody looks beyond the last view.
   while (!runs && !prepared.segments.empty() && !prepared.segments.back().viewed) prepared.segments.pop_back();
   if (!wanted({"advanced"}))
@@ -224,21 +192,27 @@ constexpr int most_ended = 2;
 void run_offered(Backend& backend, const Fixture& fixture, const PreparedReference& oracle,
                  const CheckSelection& selected, RowBuilder& builder) {
   const std::uint32_t sums = Offer::density | Offer::acceleration;
-  const std::pair<const char*, std::uint32_t> needs[] = {
-      {"substep", Offer::step},
-      {"contact", Offer::step},
-      {"advanced", Offer::step | sums | Offer::parts | Offer::neighbors},
-      {"trajectory", Offer::step},
-      {"mass", Offer::step},
-      {"containment", Offer::step},
-      {"determinism", Offer::step | sums | Offer::boundary_volume},
-      {"conservation", Offer::given | Offer::parts},
-      {"invariance", sums},
-      {"status", Offer::step | Offer::status | sums},
+  const struct {
+    const char* check;
+    std::uint32_t of_backend, of_reference;
+  } needs[] = {
+      {"substep", Offer::step, Offer::step},
+      {"contact", Offer::step, 0},
+      {"advanced", Offer::step | sums | Offer::parts | Offer::neighbors, 0},
+      {"trajectory", Offer::step, Offer::step},
+      {"mass", Offer::step, Offer::step},
+      {"containment", Offer::step, Offer::step},
+      {"determinism", Offer::step | sums | Offer::boundary_volume, Offer::step},
+      {"conservation", Offer::given | Offer::parts, Offer::given | Offer::parts},
+      {"invariance", sums, sums},
+      {"status", Offer::step | Offer::status | sums, 0},
   };
   CheckSelection checks = selected;
-  for (const auto& [check, offers] : needs)
-    if ((backend.offers() & offers) != offers && checks.erase(check) > 0) builder.not_run(check, not_offered);
+  for (const auto& [check, of_backend, of_reference] : needs) {
+    const bool offered =
+        (backend.offers() & of_backend) == of_backend && (oracle.offers & of_reference) == of_reference;
+    if (!offered && checks.erase(check) > 0) builder.not_run(check, not_offered);
+  }
 
   std::string trouble;
   int ended = 0;

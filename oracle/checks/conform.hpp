@@ -34,6 +34,7 @@ struct Segment {
 
 /// Everything the oracle has to say about one fixture. Made once, used for every backend.
 struct PreparedReference {
+  std::uint32_t offers = Offer::all;  // what of the below a reference has that is not ours (measured_reference.hpp)
   Walls walls;
   WallSolution volumes;
   ReferenceSolution own;        // every stage from the stage before

@@ -73,6 +73,11 @@ std::vector<std::string> backend_choices() {
 
 bool is_plugin(const std::string& choice) { return choice.starts_with("plugin:") || choice.starts_with("python:"); }
 
+bool names_backend(const std::string& choice) {
+  const auto names = backend_choices();
+  return is_plugin(choice) || std::ranges::find(names, choice.substr(0, choice.find(':'))) != names.end();
+}
+
 std::unique_ptr<Backend> choose_backend(const std::string& choice, const std::string& executor) {
   const auto colon = choice.find(':');
   const std::string name = choice.substr(0, colon);

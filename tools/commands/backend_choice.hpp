@@ -37,6 +37,9 @@ struct BackendFlags {
 /// Of a solver that is built elsewhere, plugin:… or python:….
 bool is_plugin(const std::string& choice);
 
+/// Whether a backend of that name there is, or it is a plug-in; a file's name is neither.
+bool names_backend(const std::string& choice);
+
 /// What --backend accepts: "reference" and the table of backends under test.
 std::vector<std::string> backend_choices();
 

@@ -2,6 +2,7 @@
 /// `decant conform`: every asked-for backend on every asked-for fixture, a table, a report, a
 /// status.
 #include "oracle/checks/conform.hpp"
+#include "oracle/checks/measured_reference.hpp"
 #include "oracle/checks/neighborhood.hpp"
 #include "oracle/files/file_aside.hpp"
 #include "oracle/files/fixture_file.hpp"
@@ -20,6 +21,7 @@
 #include "tools/common/progress.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
@@ -105,6 +107,28 @@ std::vector<Candidate> candidates_of(ConformArguments& arguments) {
   return candidates;
 }
 
+/// The reference where it is not ours: what --oracle names in place of a file.
+std::unique_ptr<Backend> own_reference(const ConformArguments& arguments) {
+  if (!names_backend(arguments.oracle)) return nullptr;
+  std::unique_ptr<Backend> reference = choose_backend(arguments.oracle, "auto");
+  if (const std::string precision = reference->info().precision; precision != "fp64")
+    throw InputError("command line", "--oracle", arguments.oracle,
+                     fmt::format("a reference in fp64; this one computes in {}", precision));
+  return reference;
+}
+
+CheckSelection checks_of(const ConformArguments& arguments) {
+  const bool measured = names_backend(arguments.oracle);
+  if (arguments.checks.empty()) return measured ? measured_checks() : all_checks();
+  const CheckSelection checks = parse_checks(arguments.checks);
+  for (const auto& check : checks)
+    if (measured && !measured_checks().count(check))
+      throw InputError("command line", "--check", check,
+                       fmt::format("one of {} where --oracle names a solver: the others have derived bounds alone",
+                                   fmt::join(measured_checks(), ", ")));
+  return checks;
+}
+
 /// All are read before the first is judged: a bad one is refused before any work.
 std::vector<Fixture> fixtures_of(const ConformArguments& arguments) {
   std::vector<std::filesystem::path> files;
@@ -134,11 +158,27 @@ CheckRow row_that_did_not_run(const Candidate& candidate, const Fixture& fixture
   return row;
 }
 
-/// Adds the rows of all, pair by pair, until one fails where that is asked for. \param judged  pairs of backend and
+/// What the reference says of one fixture, or why it says nothing.
+struct Prepared {
+  std::unique_ptr<const PreparedReference> oracle;
+  std::string why_not;
+};
+
+Prepared prepared_for(const Fixture& fixture, const CheckSelection& checks, int sample_every, Backend* own) {
+  if (!own) return {std::make_unique<const PreparedReference>(prepare_reference(fixture, checks, sample_every)), ""};
+  try {
+    return {std::make_unique<const PreparedReference>(measured_reference(*own, fixture, checks, sample_every)), ""};
+  } catch (const BackendError& error) {
+    return {nullptr, error.what()};
+  }
+}
+
+/// Adds the rows of all, pair by pair, until one fails where that is asked for. \param own  the reference, or null:
+/// ours. \param judged  pairs of backend and
 /// fixture whose rows are there; \param seconds  what each took, by its name
 void check_all(std::vector<Candidate>& candidates, const std::vector<Fixture>& fixtures, const CheckSelection& checks,
-               const ConformArguments& arguments, bool quiet, Interruptible& work, Report& report, std::int64_t& judged,
-               std::vector<std::pair<double, std::string>>& seconds) {
+               const ConformArguments& arguments, Backend* own, bool quiet, Interruptible& work, Report& report,
+               std::int64_t& judged, std::vector<std::pair<double, std::string>>& seconds) {
   using Clock = std::chrono::steady_clock;
   const auto total = static_cast<std::int64_t>(candidates.size() * fixtures.size());
   const bool any =
@@ -146,21 +186,22 @@ void check_all(std::vector<Candidate>& candidates, const std::vector<Fixture>& f
   Progress progress("check", total, 0, quiet);
   // The oracle is sequential: it works on the next fixture while backends are judged on this one.
   const auto prepared = [&](std::size_t k) {
-    return std::async(std::launch::async, [&, k] {
-      return std::make_unique<const PreparedReference>(prepare_reference(fixtures[k], checks, arguments.sample_every));
-    });
+    return std::async(std::launch::async,
+                      [&, k] { return prepared_for(fixtures[k], checks, arguments.sample_every, own); });
   };
-  std::future<std::unique_ptr<const PreparedReference>> next;
+  std::future<Prepared> next;
   if (any && !fixtures.empty()) next = prepared(0);
   for (std::size_t k = 0; k < fixtures.size(); ++k) {
     const Fixture& fixture = fixtures[k];
-    std::unique_ptr<const PreparedReference> oracle;
-    if (any) work.part([&] { oracle = next.get(); });
+    Prepared reference;
+    if (any) work.part([&] { reference = next.get(); });
+    const auto& oracle = reference.oracle;
     if (any && k + 1 < fixtures.size()) next = prepared(k + 1);
     for (Candidate& candidate : candidates) {
       progress.update(judged, fixture.name + " " + candidate.info.name);
-      if (!candidate.backend) {
-        report.rows.push_back(row_that_did_not_run(candidate, fixture, candidate.why_not));
+      if (!candidate.backend || !oracle) {
+        report.rows.push_back(
+            row_that_did_not_run(candidate, fixture, candidate.backend ? reference.why_not : candidate.why_not));
         ++judged;
         continue;
       }
@@ -318,12 +359,15 @@ int hand_over(const ConformArguments& arguments, const Report& report, const std
 }
 
 int conform_results(const ConformArguments& arguments) {
+  if (names_backend(arguments.oracle))
+    throw InputError("command line", "--oracle", arguments.oracle, "a file with --results; a solver with --backend");
   if (arguments.results.empty())
     throw InputError("command line", "--results", "not given", "required with --oracle and --name");
   if (!arguments.backends.empty() || arguments.all || arguments.executor != "auto" || !arguments.select.empty() ||
       arguments.exit_first || arguments.durations > 0)
-    throw InputError("command line", "--results", arguments.results,
-                     "instead of --backend, --executor, --all, --select, --exitfirst and --durations: nothing is run");
+    throw InputError(
+        "command line", "--results", arguments.results,
+        "instead of --backend, --executor, --all, --select, --exitfirst and --durations: nothing is run");
   if (!arguments.reproducers.empty() && !arguments.oracle.empty())
     throw InputError("command line", "--reproducers", arguments.reproducers,
                      "not with --oracle: a reproducer is cut out of a recording");
@@ -343,17 +387,22 @@ int conform_results(const ConformArguments& arguments) {
 int conform(ConformArguments& arguments) {
   if (!arguments.explain.empty()) return explain(arguments.explain);
   if (arguments.list) return list_recordings();
-  if (!arguments.results.empty() || !arguments.oracle.empty() || !arguments.name.empty())
+  const bool own_oracle = names_backend(arguments.oracle) && arguments.results.empty();
+  if (!arguments.results.empty() || (!arguments.oracle.empty() && !own_oracle) || !arguments.name.empty())
     return conform_results(arguments);
-  const CheckSelection checks = arguments.checks.empty() ? all_checks() : parse_checks(arguments.checks);
+  const CheckSelection checks = checks_of(arguments);
   check_output_place("--report", arguments.report);
   check_output_place("--junit", arguments.junit);
   check_output_folder("--reproducers", arguments.reproducers);
+  const auto own = own_reference(arguments);
   auto candidates = candidates_of(arguments);
   const auto fixtures = fixtures_of(arguments);
   const bool talks = !arguments.quiet && !arguments.json;
   Report report;
   std::int64_t judged = 0;
+  if (own)
+    report.provenance["oracle"] =
+        fmt::format("{}: {}; bounds measured on {} copies", own->info().name, own->info().device, measured_copies);
   const auto hand_over_all = [&](int status, const std::vector<ReproducerFile>& reproducers, const std::string& more) {
     add_provenance(report, candidates, fixtures);
     hand_over(arguments, report, reproducers, status, "\n" + console_table(report) + more,
@@ -367,13 +416,14 @@ int conform(ConformArguments& arguments) {
     if (talks) fmt::print(stderr, "\n");
     hand_over_all(Interruptible::exit_status(), {}, line + "\n");
   });
+  if (talks && own) fmt::print("oracle: {}\n", report.provenance["oracle"]);
   if (talks)
     for (const auto& c : candidates)
       fmt::print("{}: {}\n", c.info.name,
                  c.backend ? fmt::format("{} on {}", c.info.executor, c.info.device) : c.why_not);
   std::fflush(stdout);
   std::vector<std::pair<double, std::string>> seconds;
-  check_all(candidates, fixtures, checks, arguments, !talks, work, report, judged, seconds);
+  check_all(candidates, fixtures, checks, arguments, own.get(), !talks, work, report, judged, seconds);
   add_what_was_not_judged(candidates, fixtures, judged, "after the first failure (--exitfirst)", report);
   const int status = status_of(report, candidates);
   const auto reproducers = wanted_reproducers(arguments, report);
@@ -408,7 +458,9 @@ void add_conform_command(CLI::App& app, int& exit_status) {
   arguments->flags.add_to(*verb);
   verb->add_option("--results", arguments->results,
                    "judge this file's fields (oracle/formats/results.md) instead of a backend");
-  verb->add_option("--oracle", arguments->oracle, "their own reference, for --results of their own states");
+  verb->add_option("--oracle", arguments->oracle,
+                   "a reference of one's own: a file, for --results of one's own states; or a solver in fp64, "
+                   "plugin:PATH or python:FILE:CLASS, whose bounds are measured");
   verb->add_option("--name", arguments->name, "what the report calls --results; default: its file");
   verb->add_option("--check-every", arguments->sample_every,
                    "check mass and containment every so many substeps of a run; 1 names the first "
