@@ -19,6 +19,7 @@
 #include "tools/commands/reproducers.hpp"
 #include "tools/common/build_provenance.hpp"
 #include "tools/common/progress.hpp"
+#include "tools/common/recording.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -40,7 +41,7 @@ struct ConformArguments {
   BackendFlags flags;
   std::vector<std::string> fixtures, backends, checks;
   std::string executor = "auto", report, junit, reproducers, explain;
-  std::string results, oracle, name, select;
+  std::string results, oracle, name, select, kernel;
   int sample_every = 0, durations = 0;
   bool all = false, list = false, json = false, quiet = false, exit_first = false;
 };
@@ -144,6 +145,14 @@ std::vector<Fixture> fixtures_of(const ConformArguments& arguments) {
   }
   std::vector<Fixture> fixtures;
   for (const auto& file : files) fixtures.push_back(read_fixture(file));
+  if (!arguments.kernel.empty()) {
+    const auto known = std::ranges::find(kernel_names, arguments.kernel);
+    if (known == kernel_names.end())
+      throw InputError("command line", "--kernel", arguments.kernel,
+                       fmt::format("one of {}", fmt::join(kernel_names, ", ")));
+    const auto kernel = static_cast<KernelFamily>(known - kernel_names.begin());
+    for (Fixture& fixture : fixtures) fixture = with_kernel(std::move(fixture), kernel);
+  }
   return fixtures;
 }
 
@@ -364,10 +373,10 @@ int conform_results(const ConformArguments& arguments) {
   if (arguments.results.empty())
     throw InputError("command line", "--results", "not given", "required with --oracle and --name");
   if (!arguments.backends.empty() || arguments.all || arguments.executor != "auto" || !arguments.select.empty() ||
-      arguments.exit_first || arguments.durations > 0)
+      arguments.exit_first || arguments.durations > 0 || !arguments.kernel.empty())
     throw InputError(
         "command line", "--results", arguments.results,
-        "instead of --backend, --executor, --all, --select, --exitfirst and --durations: nothing is run");
+        "instead of --backend, --executor, --all, --select, --exitfirst, --durations and --kernel: nothing is run");
   if (!arguments.reproducers.empty() && !arguments.oracle.empty())
     throw InputError("command line", "--reproducers", arguments.reproducers,
                      "not with --oracle: a reproducer is cut out of a recording");
@@ -445,6 +454,9 @@ void add_conform_command(CLI::App& app, int& exit_status) {
   verb->add_flag("-x,--exitfirst", arguments->exit_first, "stop after the first recording and backend that fail");
   verb->add_option("--durations", arguments->durations, "print the so many slowest pairs of backend and recording")
       ->check(CLI::Range(1, 10000));
+  verb->add_option("--kernel", arguments->kernel,
+                   "judge the recorded states with this kernel in place of their own: cubic_spline, wendland_c2 or "
+                   "mueller2003");
   verb->add_flag("--list", arguments->list, "print the names of all recordings; judges nothing");
   verb->add_option("--backend", arguments->backends, "brute,…, plugin:PATH, python:FILE:CLASS; default: all under test")
       ->delimiter(',')

@@ -3,6 +3,7 @@
 #include "tools/common/recording.hpp"
 
 #include "oracle/checks/conform.hpp"
+#include "reference/error.hpp"
 #include "reference/sampling.hpp"
 
 namespace decant {
@@ -14,6 +15,17 @@ std::string record_answer(Fixture& fixture, std::int64_t ensemble_substeps, std:
   fixture.ensemble =
       run_ensemble(fixture.scene, sample_walls(fixture.scene), fixture.state, ensemble_substeps, ensemble_members);
   return ill_posed_reason;
+}
+
+Fixture with_kernel(Fixture fixture, KernelFamily kernel) {
+  if (fixture.scene.kernel == kernel) return fixture;
+  fixture.scene.kernel = kernel;
+  const std::string recorded = fixture.name;
+  fixture.name += std::string("-") + to_string(kernel);
+  fixture.sample_id.resize(0);
+  const std::string why = record_answer(fixture, fixture.ensemble.substeps, fixture.ensemble.members);
+  if (!why.empty()) throw InputError("command line", "--kernel", to_string(kernel), recorded + ": " + why);
+  return fixture;
 }
 
 }  // namespace decant

@@ -14,4 +14,9 @@ namespace decant {
 /// one.
 std::string record_answer(Fixture& fixture, std::int64_t ensemble_substeps, std::int64_t ensemble_members);
 
+/// The recording's state in the same scene with another kernel, answered anew; itself where it has that kernel. Throws
+/// InputError where no backend could pass on it.
+/// \param kernel  one of kernel_names
+Fixture with_kernel(Fixture fixture, KernelFamily kernel);
+
 }  // namespace decant
