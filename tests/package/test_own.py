@@ -48,6 +48,71 @@ def test_spread_beside_derived_tolerances(recording):
     assert missed <= ({"walls at rest"} if recording == "hostile-periodic" else set())  # they are
 
 
+def phases(inputs, faulty=False):
+    """Mass and h per particle, two phases, energy, continuity density, stress; rates as of a scheme of half steps."""
+    x, v, m, h, e, phase = (inputs[k] for k in ("position", "velocity", "mass", "h", "energy", "phase"))
+    one = x.dtype.type
+    d, w = x[:, None] - x[None], v[:, None] - v[None]
+    r = np.sqrt((d * d).sum(2))
+    q = r / (h[:, None] + h[None])
+    slope = np.where((q < 1) & (r > 0), -(one(1) - q) / np.where(r > 0, r, 1), one(0))[..., None] * d
+    rho = inputs["density"]
+    p = (one(0.4) + one(0.2) * (phase if not faulty else 0 * phase).astype(x.dtype)) * rho * e
+    share = p / rho**2
+    pair = m[None, :, None] * (share[:, None, None] + share[None, :, None]) * slope
+    work = (w * slope).sum(2)
+    stress = -(m / rho)[None, :, None, None] * w[..., :, None] * slope[..., None, :]
+    return {
+        "density_rate": (m[None] * work).sum(1), "acceleration": -pair.sum(1), "stress": stress.sum(1),
+        "energy_rate": share * (m[None] * work).sum(1), "velocity_half": v - one(0.5) * pair.sum(1),
+    }  # fmt: skip
+
+
+def test_other_kinds_of_state(tmp_path):
+    rng = np.random.default_rng(5)
+    n = 300
+    inputs = {
+        "position": rng.random((n, 3), np.float32), "velocity": rng.standard_normal((n, 3), np.float32),
+        "mass": rng.uniform(1, 2, n).astype(np.float32), "h": rng.uniform(0.08, 0.12, n).astype(np.float32),
+        "energy": rng.uniform(1, 3, n).astype(np.float32), "density": rng.uniform(900, 1100, n).astype(np.float32),
+        "phase": rng.integers(0, 2, n),
+    }  # fmt: skip
+    bounds = decant.spread(phases, inputs, single=phases)
+    assert bounds["stress"].value.shape == (n, 3, 3)
+    assert all(verdict.passes for verdict in decant.judge(phases, bounds, inputs))
+    wrong = {v.field: v for v in decant.judge(lambda i: phases(i, faulty=True), bounds, inputs)}
+    assert {name for name, v in wrong.items() if not v.passes} == {"acceleration", "energy_rate", "velocity_half"}
+
+    def one_entry(i):
+        fields = phases(i)
+        fields["stress"][:, 0, 2] *= 1.1
+        return fields
+
+    (stress,) = (v for v in decant.judge(one_entry, bounds, inputs) if v.field == "stress")
+    assert "in component [0, 2] alone" in stress.diagnosis
+
+    # The same bounds for a port that is another program, by files.
+    reference, port = tmp_path / "reference.h5", tmp_path / "port.h5"
+    decant.write_reference(reference, {k: b.field() for k, b in bounds.items()}, position=inputs["position"])
+    decant.write_results(port, phases(inputs))
+    done = decant.command.run(["conform", "--oracle", str(reference), "--results", str(port)], passes=(0, 1))
+    assert done.returncode == 0, done.stdout
+    decant.write_results(port, one_entry(inputs))
+    done = decant.command.run(["conform", "--oracle", str(reference), "--results", str(port)], passes=(0, 1))
+    assert done.returncode == 1 and "fields / stress" in done.stdout and "entry [0,2]" in done.stdout
+
+    small = decant.cut_out(inputs, stress.particle, 0.3)
+    assert 1 < len(small["position"]) < n and len(small["phase"]) == len(small["position"])
+    for whole, part in zip(phases(inputs).values(), phases(small).values(), strict=True):
+        np.testing.assert_allclose(part[0], whole[stress.particle], rtol=1e-4, atol=1e-4)
+
+
+def test_pairs_near_the_cutoff_are_told():
+    x = np.array([[0, 0], [1, 0], [1 + 1e-7, 0.5], [2.9, 0]])
+    np.testing.assert_array_equal(decant.near_cutoff(x, 1.0), [1, 1, 0, 0])
+    np.testing.assert_array_equal(decant.near_cutoff(x, 1.1, period=[3.0, 0]), [0, 1, 0, 1])
+
+
 def test_correct_port_passes_and_wrong_ones_are_named(inputs):
     bounds = decant.spread(sums, inputs, single=sums)
     assert all(bound.false_alarms < 1e-2 for bound in bounds.values())

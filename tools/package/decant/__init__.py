@@ -23,16 +23,18 @@ from .model import (
     State,
     Walls,
 )
-from .own import Bound, OwnVerdict, diagnose, judge, spread
+from .own import Bound, OwnVerdict, cut_out, diagnose, judge, spread
 from .port import OFFERS, Port
 from .properties import Property, kernel_properties, properties, repels
 from .reports import Fixture, Report, Row, read_columns, read_fixture, read_report, recordings, to_pandas
+from .results_file import field, near_cutoff, pair_sums, write_reference, write_results
 from .verbs import Campaign, Drift, bench, conform, diff, drift, fuzz
 
 __all__ = [
     "COUNT_FIELDS", "OFFERS", "REAL_FIELDS", "BackendError", "Bound", "Campaign", "CommandError", "Drift", "Fixture",
     "Given", "InputError", "Lists", "Oracle", "OwnVerdict", "Port", "Pose", "Property", "Report", "Row", "Scene",
-    "StageTimes", "State", "Walls", "bench", "conform", "diagnose", "diff", "drift", "fixture_folder", "fuzz",
-    "include_folder", "judge", "kernel_properties", "on_host", "properties", "read_columns", "read_fixture",
-    "read_report", "recordings", "repels", "scene_folder", "spread", "to_pandas",
+    "StageTimes", "State", "Walls", "bench", "conform", "cut_out", "diagnose", "diff", "drift", "field",
+    "fixture_folder", "fuzz", "include_folder", "judge", "kernel_properties", "near_cutoff", "on_host", "pair_sums",
+    "properties", "read_columns", "read_fixture", "read_report", "recordings", "repels", "scene_folder", "spread",
+    "to_pandas", "write_reference", "write_results",
 ]  # fmt: skip

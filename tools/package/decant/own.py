@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from .arrays import on_host
+from .results_file import field
 
 Array = np.ndarray
 Inputs = Mapping[str, Array]
@@ -34,6 +35,10 @@ class Bound:
     tolerance: Array  # FACTOR * spread + FLOOR u (|value| + RMS)
     false_alarms: float  # share of a correct port's values that fail, upper 95 % limit; NaN: no fp32 program was given
     copies: int
+
+    def field(self, unit: str | None = None) -> dict[str, Any]:
+        """For write_reference(): the value with its tolerance, to judge a port that is another program."""
+        return field(self.value, unit, each=self.tolerance)
 
 
 def evaluated(solver: Solver, inputs: Inputs) -> dict[str, Array]:
@@ -164,10 +169,27 @@ def judge(port: Solver, bounds: Mapping[str, Bound], inputs: Inputs) -> list[Own
     return out
 
 
+def cut_out(inputs: Inputs, particle: int, radius: float, period: Array | None = None) -> dict[str, Array]:
+    """The inputs of the particles within `radius`, m, of one, which comes first: a small problem to debug with.
+
+    period: [D], m, 0 where an axis has none. Inputs that are not per particle stay as they are.
+    """
+    x = np.asarray(inputs["position"], np.float64)
+    apart = x - x[particle]
+    if period is not None:
+        some = np.where(np.asarray(period) > 0, period, 1)
+        apart -= np.where(np.asarray(period) > 0, some * np.round(apart / some), 0)
+    distance = np.sqrt((apart**2).sum(axis=1))
+    near = np.flatnonzero(distance <= radius)
+    near = near[np.argsort(distance[near], kind="stable")]
+    near = np.concatenate([[particle], near[near != particle]])
+    return {name: np.asarray(v)[near] if len(np.atleast_1d(v)) == len(x) else v for name, v in inputs.items()}
+
+
 def diagnose(actual: Array, expected: Array, tolerance: Array, position: Array | None = None) -> str:
     """The kind of an error, in words: not finite, opposite sign, a factor, an offset, one component, or a region.
 
-    actual, expected, tolerance: [n] or [n,3]; position: [n,3], in which a region is looked for.
+    actual, expected, tolerance: [n], or [n,…] of vectors and tensors; position: [n,D], in which a region is looked for.
     """
     actual, expected, tolerance = (np.asarray(v, np.float64) for v in (actual, expected, tolerance))
     bad = ~(np.abs(actual - expected) <= tolerance)
@@ -193,8 +215,11 @@ def diagnose(actual: Array, expected: Array, tolerance: Array, position: Array |
     if explains(expected + offset):
         return "all values + " + np.array2string(np.asarray(offset), precision=4)
     said = f"{int(rows.sum())} of {len(rows)} particles are wrong"
-    if bad.ndim == 2 and bad.any(axis=0).sum() == 1:
-        said += f", in component {'xyz'[int(np.argmax(bad.any(axis=0)))]} alone"
+    components = bad.any(axis=0) if bad.ndim > 1 else np.zeros(0, bool)
+    if components.sum() == 1:
+        which = [int(k) for k in np.unravel_index(int(np.argmax(components)), components.shape)]
+        name = "xyz"[which[0]] if len(which) == 1 and which[0] < 3 else which
+        said += f", in component {name} alone"
     if position is not None and 3 < rows.sum() < 0.5 * len(rows):
         for axis, x in enumerate(np.asarray(position).T):
             # A region is where most particles are on the other side of all of them.

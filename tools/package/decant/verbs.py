@@ -63,6 +63,15 @@ def _repeated(option: str, values: Sequence[Any] | Any | None) -> list[str]:
 
 
 @contextlib.contextmanager
+def _oracle(oracle: Backend | None) -> Iterator[list[str]]:
+    if oracle is None:
+        yield []
+        return
+    with named(oracle) as choice:
+        yield ["--oracle", choice]
+
+
+@contextlib.contextmanager
 def _report(file: PathLike | None, name: str) -> Iterator[Path]:
     """The file asked for, or one that goes when it has been read."""
     if file is not None:
@@ -78,16 +87,21 @@ def conform(
     options: Mapping[str, Any] | None = None,
     checks: Sequence[str] | str | None = None,
     executor: str = "auto",
+    oracle: Backend | None = None,
+    kernel: str | None = None,
     report: PathLike | None = None,
     reproducers: PathLike | None = None,
 ) -> Report:
     """Judges a backend on recordings (files or names; default: the small ones).
 
-    checks: fields, substep, …; default: all. report: keeps the HDF5 file. reproducers: a folder for small fixtures of
-    failing particles. Returns a Report, failing rows included. Raises CommandError for bad input.
+    checks: fields, substep, …; default: all. oracle: a solver in fp64 as the reference, with bounds that are measured;
+    default: Decant's own. kernel: the recorded states with this kernel in place of their own. report: keeps the HDF5
+    file. reproducers: a folder for small fixtures of failing particles.
+    Returns a Report, failing rows included. Raises CommandError for bad input.
     """
-    with named(backend, options) as choice, _report(report, "conform.h5") as file:
-        arguments = ["conform", *map(str, fixtures), "--backend", choice, "--executor", executor]
+    with named(backend, options) as choice, _oracle(oracle) as reference, _report(report, "conform.h5") as file:
+        arguments = ["conform", *map(str, fixtures), "--backend", choice, "--executor", executor, *reference]
+        arguments += _repeated("--kernel", kernel)
         arguments += [*_repeated("--check", checks), "--report", str(file), "--quiet"]
         if reproducers is not None:
             arguments += ["--reproducers", str(reproducers)]
