@@ -3,7 +3,6 @@
 /// status.
 #include "oracle/checks/conform.hpp"
 #include "oracle/checks/measured_reference.hpp"
-#include "oracle/checks/neighborhood.hpp"
 #include "oracle/files/file_aside.hpp"
 #include "oracle/files/fixture_file.hpp"
 #include "oracle/files/report_file.hpp"
@@ -12,22 +11,20 @@
 #include "tools/commands/backend_choice.hpp"
 #include "tools/commands/check_results_file.hpp"
 #include "tools/commands/commands.hpp"
+#include "tools/commands/conform_run.hpp"
 #include "tools/commands/fixture_folder.hpp"
 #include "tools/commands/interruptible.hpp"
 #include "tools/commands/junit.hpp"
 #include "tools/commands/output_place.hpp"
+#include "tools/commands/report_json.hpp"
 #include "tools/commands/reproducers.hpp"
 #include "tools/common/build_provenance.hpp"
-#include "tools/common/progress.hpp"
 #include "tools/common/recording.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <nlohmann/json.hpp>
 
 #include <algorithm>
-#include <chrono>
-#include <future>
 #include <memory>
 #include <set>
 #include <string>
@@ -46,9 +43,6 @@ struct ConformArguments {
   bool all = false, list = false, json = false, quiet = false, exit_first = false;
 };
 
-// Of what a report shows around its first failing particle, in H.
-constexpr double shown_radius = 6;
-
 constexpr const char* conform_footer =
     "Without FIXTURE the small recordings beside the binary are judged (or those in the folder "
     "that\n"
@@ -66,30 +60,6 @@ constexpr const char* conform_footer =
     "\n"
     "Example:\n"
     "  decant conform --backend brute --report build/conform.h5";
-
-/// A backend that was asked for, or why it is not there.
-struct Candidate {
-  std::unique_ptr<Backend> backend;
-  BackendInfo info;
-  std::string why_not;
-  bool device_absent = false;
-};
-
-Candidate candidate_of(const std::string& name, const std::string& executor) {
-  Candidate c;
-  c.info.name = name;
-  c.info.executor = executor;
-  try {
-    c.backend = choose_backend(name, executor);
-    c.info = c.backend->info();
-  } catch (const DeviceAbsent& error) {
-    c.why_not = error.what();
-    c.device_absent = true;
-  } catch (const BackendError& error) {
-    c.why_not = error.what();
-  }
-  return c;
-}
 
 std::vector<Candidate> candidates_of(ConformArguments& arguments) {
   std::vector<std::string> names = arguments.backends;
@@ -156,106 +126,6 @@ std::vector<Fixture> fixtures_of(const ConformArguments& arguments) {
   return fixtures;
 }
 
-CheckRow row_that_did_not_run(const Candidate& candidate, const Fixture& fixture, const std::string& why) {
-  CheckRow row;
-  row.backend = candidate.info.name;
-  row.executor = candidate.info.executor;
-  row.device = candidate.info.device;
-  row.fixture = fixture.name;
-  row.check = "all";
-  row.reason = why;
-  return row;
-}
-
-/// What the reference says of one fixture, or why it says nothing.
-struct Prepared {
-  std::unique_ptr<const PreparedReference> oracle;
-  std::string why_not;
-};
-
-Prepared prepared_for(const Fixture& fixture, const CheckSelection& checks, int sample_every, Backend* own) {
-  if (!own) return {std::make_unique<const PreparedReference>(prepare_reference(fixture, checks, sample_every)), ""};
-  try {
-    return {std::make_unique<const PreparedReference>(measured_reference(*own, fixture, checks, sample_every)), ""};
-  } catch (const BackendError& error) {
-    return {nullptr, error.what()};
-  }
-}
-
-/// Adds the rows of all, pair by pair, until one fails where that is asked for. \param own  the reference, or null:
-/// ours. \param judged  pairs of backend and
-/// fixture whose rows are there; \param seconds  what each took, by its name
-void check_all(std::vector<Candidate>& candidates, const std::vector<Fixture>& fixtures, const CheckSelection& checks,
-               const ConformArguments& arguments, Backend* own, bool quiet, Interruptible& work, Report& report,
-               std::int64_t& judged, std::vector<std::pair<double, std::string>>& seconds) {
-  using Clock = std::chrono::steady_clock;
-  const auto total = static_cast<std::int64_t>(candidates.size() * fixtures.size());
-  const bool any =
-      std::any_of(candidates.begin(), candidates.end(), [](const Candidate& c) { return c.backend != nullptr; });
-  Progress progress("check", total, 0, quiet);
-  // The oracle is sequential: it works on the next fixture while backends are judged on this one.
-  const auto prepared = [&](std::size_t k) {
-    return std::async(std::launch::async,
-                      [&, k] { return prepared_for(fixtures[k], checks, arguments.sample_every, own); });
-  };
-  std::future<Prepared> next;
-  if (any && !fixtures.empty()) next = prepared(0);
-  for (std::size_t k = 0; k < fixtures.size(); ++k) {
-    const Fixture& fixture = fixtures[k];
-    Prepared reference;
-    if (any) work.part([&] { reference = next.get(); });
-    const auto& oracle = reference.oracle;
-    if (any && k + 1 < fixtures.size()) next = prepared(k + 1);
-    for (Candidate& candidate : candidates) {
-      progress.update(judged, fixture.name + " " + candidate.info.name);
-      if (!candidate.backend || !oracle) {
-        report.rows.push_back(
-            row_that_did_not_run(candidate, fixture, candidate.backend ? reference.why_not : candidate.why_not));
-        ++judged;
-        continue;
-      }
-      std::vector<CheckRow> rows;
-      const auto start = Clock::now();
-      work.part([&] {
-        rows = run_checks(*candidate.backend, fixture, *oracle, checks);
-        for (CheckRow& row : rows) condense(row);
-      });
-      seconds.emplace_back(std::chrono::duration<double>(Clock::now() - start).count(),
-                           candidate.info.name + " " + fixture.name);
-      bool fails = false;
-      for (CheckRow& row : rows) {
-        fails |= verdict_of(row) == Verdict::fail;
-        if (!report.neighborhood && is_located(row))
-          report.neighborhood = neighborhood_of(fixture, oracle->walls, oracle->own.fields.density, row,
-                                                static_cast<std::int64_t>(report.rows.size()),
-                                                shown_radius * fixture.scene.support_radius());
-        report.rows.push_back(std::move(row));
-      }
-      ++judged;
-      if (fails && arguments.exit_first) return;
-    }
-  }
-  progress.update(total);
-}
-
-/// The slowest pairs of backend and fixture, one per line.
-std::string slowest(std::vector<std::pair<double, std::string>> seconds, int most) {
-  std::sort(seconds.rbegin(), seconds.rend());
-  std::string text;
-  for (std::size_t k = 0; k < seconds.size() && k < static_cast<std::size_t>(most); ++k)
-    text += fmt::format("{:8.2f} s  {}\n", seconds[k].first, seconds[k].second);
-  return text.empty() ? text : "\nslowest, without the reference\n" + text;
-}
-
-/// What was asked for and is not there is in the report too.
-void add_what_was_not_judged(const std::vector<Candidate>& candidates, const std::vector<Fixture>& fixtures,
-                             std::int64_t judged, const std::string& why, Report& report) {
-  std::int64_t pair = 0;
-  for (const Fixture& fixture : fixtures)
-    for (const Candidate& candidate : candidates)
-      if (pair++ >= judged) report.rows.push_back(row_that_did_not_run(candidate, fixture, why));
-}
-
 void add_provenance(Report& report, const std::vector<Candidate>& candidates, const std::vector<Fixture>& fixtures) {
   auto& p = report.provenance;
   p.merge(build_provenance());
@@ -272,45 +142,6 @@ int status_of(const Report& report, const std::vector<Candidate>& candidates) {
   const bool absent =
       std::any_of(candidates.begin(), candidates.end(), [](const Candidate& c) { return c.device_absent; });
   return status == exit_failure && absent && only_the_device ? exit_device_absent : status;
-}
-
-std::string json_text(const Report& report, const std::vector<ReproducerFile>& reproducers, const std::string& line,
-                      int status) {
-  nlohmann::ordered_json rows = nlohmann::ordered_json::array(), files = rows;
-  for (const auto& r : report.rows)
-    rows.push_back({{"backend", r.backend},
-                    {"options", r.options},
-                    {"executor", r.executor},
-                    {"device", r.device},
-                    {"fixture", r.fixture},
-                    {"check", r.check},
-                    {"field", r.field},
-                    {"unit", r.unit},
-                    {"n", r.n},
-                    {"error", r.error},
-                    {"tolerance", r.tolerance},
-                    {"score", r.score},
-                    {"median_score", r.median_score},
-                    {"fp32_reference_score", r.fp32_reference_score},
-                    {"worst_id", r.worst_id},
-                    {"worst_component", r.worst_component},
-                    {"actual", r.actual},
-                    {"expected", r.expected},
-                    {"worst_position", {r.worst_x, r.worst_y, r.worst_z}},
-                    {"fluid_neighbors", r.fluid_neighbors},
-                    {"wall_neighbors", r.wall_neighbors},
-                    {"nearest", r.nearest},
-                    {"excluded", r.excluded},
-                    {"verdict", to_string(verdict_of(r))},
-                    {"reason", reason_of(r)}});
-  for (const auto& reproducer : reproducers)
-    files.push_back({{"row", reproducer.row}, {"file", reproducer.file.string()}});
-  const nlohmann::ordered_json all = {{"summary", line},
-                                      {"exit_status", status},
-                                      {"rows", rows},
-                                      {"reproducers", files},
-                                      {"provenance", report.provenance}};
-  return all.dump(2);
 }
 
 /// Names of all recordings, those of study scale marked.
@@ -407,8 +238,8 @@ int conform(ConformArguments& arguments) {
   auto candidates = candidates_of(arguments);
   const auto fixtures = fixtures_of(arguments);
   const bool talks = !arguments.quiet && !arguments.json;
-  Report report;
-  std::int64_t judged = 0;
+  Judged judged;
+  Report& report = judged.report;
   if (own)
     report.provenance["oracle"] =
         fmt::format("{}: {}; bounds measured on {} copies", own->info().name, own->info().device, measured_copies);
@@ -418,9 +249,9 @@ int conform(ConformArguments& arguments) {
               verdict_line(report) + (more.empty() ? "" : "\n" + more.substr(0, more.size() - 1)));
   };
   Interruptible work([&] {
-    add_what_was_not_judged(candidates, fixtures, judged, "interrupted", report);
+    add_what_was_not_judged(candidates, fixtures, "interrupted", judged);
     const auto all = static_cast<std::int64_t>(candidates.size() * fixtures.size());
-    const std::string line = interrupted_line(judged, all, "judged");
+    const std::string line = interrupted_line(judged.pairs, all, "judged");
     report.provenance["interrupted"] = line;
     if (talks) fmt::print(stderr, "\n");
     hand_over_all(Interruptible::exit_status(), {}, line + "\n");
@@ -431,13 +262,13 @@ int conform(ConformArguments& arguments) {
       fmt::print("{}: {}\n", c.info.name,
                  c.backend ? fmt::format("{} on {}", c.info.executor, c.info.device) : c.why_not);
   std::fflush(stdout);
-  std::vector<std::pair<double, std::string>> seconds;
-  check_all(candidates, fixtures, checks, arguments, own.get(), !talks, work, report, judged, seconds);
-  add_what_was_not_judged(candidates, fixtures, judged, "after the first failure (--exitfirst)", report);
+  const ConformRun run{fixtures, checks, own.get(), arguments.sample_every, arguments.exit_first, !talks};
+  check_all(candidates, run, work, judged);
+  add_what_was_not_judged(candidates, fixtures, "after the first failure (--exitfirst)", judged);
   const int status = status_of(report, candidates);
   const auto reproducers = wanted_reproducers(arguments, report);
   hand_over_all(status, reproducers, "");
-  if (talks) fmt::print("{}", slowest(seconds, arguments.durations));
+  if (talks) fmt::print("{}", slowest(judged.seconds, arguments.durations));
   write_reproducers(reproducers, report, fixtures, talks);
   return status;
 }

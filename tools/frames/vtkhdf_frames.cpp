@@ -21,7 +21,6 @@ namespace {
 
 using Shape = std::vector<hsize_t>;
 
-const std::string& root = vtkhdf_root;
 constexpr hsize_t topologies = 4;  // Vertices, Lines, Polygons, Strips
 
 IdVector one(std::int64_t value) { return IdVector::Constant(1, value); }
@@ -142,34 +141,34 @@ void write_fluid_vtkhdf(const std::filesystem::path& file, const Layout& layout,
     if (vector) vtk.shown(path, type, {t * particles, 3}, source, {t, particles, 3}, unit);
     else vtk.shown(path, type, {t * particles}, source, {t, particles}, unit);
   };
-  begin_vtkhdf(vtk.out(), root, "PolyData", 0);
-  vtk.out().integers(root + "/NumberOfPoints", one(n));
-  shown(root + "/Points", "/fluid/position", H5T_IEEE_F32LE, true, "m");
-  write_vtkhdf_vertices(vtk.out(), root + "/Vertices", n);
-  for (const char* kind : {"/Lines", "/Polygons", "/Strips"}) write_vtkhdf_vertices(vtk.out(), root + kind, 0);
+  begin_vtkhdf(vtk.out(), vtkhdf_root, "PolyData", 0);
+  vtk.out().integers(vtkhdf_root + "/NumberOfPoints", one(n));
+  shown(vtkhdf_root + "/Points", "/fluid/position", H5T_IEEE_F32LE, true, "m");
+  write_vtkhdf_vertices(vtk.out(), vtkhdf_root + "/Vertices", n);
+  for (const char* kind : {"/Lines", "/Polygons", "/Strips"}) write_vtkhdf_vertices(vtk.out(), vtkhdf_root + kind, 0);
   std::vector<std::string> names;
   for (const Array& array : arrays) {
     const std::string name = array.name;
-    shown(root + "/PointData/" + name, "/fluid/" + name, array.type, array.vector, array.unit);
+    shown(vtkhdf_root + "/PointData/" + name, "/fluid/" + name, array.type, array.vector, array.unit);
     names.push_back(name);
   }
-  vtk.steps(root, n * IdVector::LinSpaced(layout.frames, 0, layout.frames - 1), names);
+  vtk.steps(vtkhdf_root, n * IdVector::LinSpaced(layout.frames, 0, layout.frames - 1), names);
   vtk.out().commit();
 }
 
 void write_walls_vtkhdf(const std::filesystem::path& file, const Layout& layout, const std::vector<double>& times,
                         const std::string& data_file) {
   VtkHdf vtk(file, layout, times, data_file);
-  vtk.ordered_group(root);
-  begin_vtkhdf(vtk.out(), root, "PartitionedDataSetCollection", 1);
-  vtk.ordered_group(root + "/Assembly");
+  vtk.ordered_group(vtkhdf_root);
+  begin_vtkhdf(vtk.out(), vtkhdf_root, "PartitionedDataSetCollection", 1);
+  vtk.ordered_group(vtkhdf_root + "/Assembly");
   for (std::size_t w = 0; w < layout.walls.size(); ++w) {
     // VTK's assembly takes no name that begins with a digit, and the collection has members of its own.
-    const std::string name = "wall_" + layout.walls[w].name, group = root + "/" + name;
+    const std::string name = "wall_" + layout.walls[w].name, group = vtkhdf_root + "/" + name;
     write_wall(vtk, group, layout.walls[w]);
     vtk.out().attribute(group, "Index", static_cast<std::int64_t>(w));
-    vtk.ordered_group(root + "/Assembly/" + name);
-    vtk.link(root + "/Assembly/" + name + "/" + name, group);
+    vtk.ordered_group(vtkhdf_root + "/Assembly/" + name);
+    vtk.link(vtkhdf_root + "/Assembly/" + name + "/" + name, group);
   }
   vtk.out().commit();
 }
