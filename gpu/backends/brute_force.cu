@@ -12,6 +12,39 @@
 namespace decant::gpu {
 namespace {
 
+#ifndef __CUDACC__
+/// The host's filter, by vectors of particles: the left sides above for a batch of positions, the least per particle.
+/// Neither form contracts or reorders, so that all processors give the same bits.
+inline constexpr int batch_positions = 16;
+struct TileVectors {
+  float x[tile_particles_per_thread], y[tile_particles_per_thread], z[tile_particles_per_thread];  // −2 x_i
+};
+[[gnu::always_inline]] inline void find_least(const TileVectors& back, const float4* positions, float* least) {
+  for (int s = 0; s < batch_positions; ++s) {
+    const float4 p = positions[s];
+#pragma omp simd
+    for (int k = 0; k < tile_particles_per_thread; ++k) {
+      const float side = back.x[k] * p.x + (back.y[k] * p.y + (back.z[k] * p.z + p.w));
+      least[k] = side < least[k] ? side : least[k];
+    }
+  }
+}
+void find_least_plain(const TileVectors& back, const float4* positions, float* least) {
+  find_least(back, positions, least);
+}
+#ifdef __x86_64__
+[[gnu::target("avx2")]] void find_least_avx2(const TileVectors& back, const float4* positions, float* least) {
+  find_least(back, positions, least);
+}
+#endif
+auto chosen_find_least() {
+#ifdef __x86_64__
+  if (__builtin_cpu_supports("avx2")) return find_least_avx2;
+#endif
+  return find_least_plain;
+}
+#endif
+
 template <bool periodic>
 struct BruteNeighbors {
   Constants c;
@@ -62,6 +95,16 @@ struct BruteNeighbors {
       bound[k] = c.H2 - squared + 16.0f * 0x1p-24f * (reach * reach);
       back[k] = -2.0f * x[k];
     }
+#ifndef __CUDACC__
+    static_assert(batch == batch_positions);
+    const auto find = chosen_find_least();
+    TileVectors sides;
+    for (int k = 0; k < Team::particles_per_thread; ++k) {
+      sides.x[k] = back[k].x;
+      sides.y[k] = back[k].y;
+      sides.z[k] = back[k].z;
+    }
+#endif
     int put_off[room];  // first point × particles_per_thread + k
     int waiting = 0;
 #pragma unroll 1
@@ -97,14 +140,7 @@ struct BruteNeighbors {
               least[k] = lesser(back[k].x * p.x + (back[k].y * p.y + (back[k].z * p.z + p.w)), least[k]);
           }
 #else
-          // A smallest float is found one by one, whether any is small by vectors.
-          int near = 0;
-#pragma omp simd reduction(| : near)
-          for (int s = 0; s < batch; ++s) {
-            const float4 p = tile[at + s];
-            near |= back[0].x * p.x + (back[0].y * p.y + (back[0].z * p.z + p.w)) < bound[0];
-          }
-          if (near != 0) least[0] = -3.0e38f;
+          find(sides, tile + at, least);
 #endif
         }
         bool any = false;

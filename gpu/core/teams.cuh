@@ -28,7 +28,8 @@ inline constexpr int tile_lanes = 16, tile_particles_per_thread = 4;
 /// Positions of a tile: the longer it is, the fewer the waits for all threads to have read it.
 inline constexpr int tile_positions = 8 * tile_size;
 #else
-inline constexpr int tile_lanes = 1, tile_particles_per_thread = 1, tile_positions = tile_size;
+/// A position is tested with several particles side by side in vectors.
+inline constexpr int tile_lanes = 1, tile_particles_per_thread = 16, tile_positions = tile_size;
 #endif
 
 /// Every thread of a block runs the same calls, so a sweep or a sum may synchronise inside. Threads past the
@@ -78,12 +79,12 @@ class TileTeam {
   float4* tile_;
   int n_;
 #else
-  static constexpr int particles_per_block = 1;
-  explicit TileTeam(int i) : i_(i) {}
+  static constexpr int particles_per_block = particles_per_thread;
+  TileTeam(int team, int n) : first_(team * particles_per_block), n_(n) {}
   int lane() const { return 0; }
   bool is_leader() const { return true; }
-  int particle(int) const { return i_; }
-  bool active(int) const { return true; }
+  int particle(int k) const { return active(k) ? first_ + k : n_ - 1; }
+  bool active(int k) const { return first_ + k < n_; }
   const float4* tile(const float4* positions, int first, int) const { return positions + first; }
   template <class T>
   T sum(T value) const {
@@ -91,7 +92,7 @@ class TileTeam {
   }
 
  private:
-  int i_;
+  int first_, n_;
 #endif
 };
 
@@ -183,10 +184,18 @@ DECANT_DEVICE void for_each_team(int n, const Body& body) {
     if (team.particle(0) < n) body(team);
   }
 #else
-  for_each_thread(n, [&body](int i) {
-    Team team(i);
-    body(team);
-  });
+  if constexpr (std::is_same_v<Team, TileTeam>) {
+    constexpr int each = TileTeam::particles_per_block;
+    for_each_thread((n + each - 1) / each, [&body, n](int i) {
+      TileTeam team(i, n);
+      body(team);
+    });
+  } else {
+    for_each_thread(n, [&body](int i) {
+      Team team(i);
+      body(team);
+    });
+  }
 #endif
 }
 
