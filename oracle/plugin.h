@@ -96,7 +96,8 @@ typedef struct decant_state {
   const double* velocity; /**< [count][3], m/s */
 } decant_state;
 
-/** In place of what the plug-in would compute; null: not given. */
+/** Inputs of later stages in place of what the plug-in would compute; null: not given. The pressure in decant_fields is
+ * always that of the density in use, by the plug-in's equation of state: never the pressure that is given here. */
 typedef struct decant_given {
   uint32_t size;
   uint32_t unused;

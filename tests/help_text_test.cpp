@@ -76,9 +76,14 @@ TEST(Command, SaysWhatWasProbablyMeant) {
 TEST(Command, FindsRecordingsByName) {
   EXPECT_EQ(answer_to("conform hostile-empty --backend hash --quiet").status, 0);
   EXPECT_EQ(answer_to("conform no-such-state --backend hash --quiet").status, 2);
+  const test::ShellOutput mistyped = answer_to("conform hostile-emty --quiet");
+  EXPECT_EQ(mistyped.status, 2);
+  EXPECT_NE(mistyped.text.find("did you mean hostile-empty?"), std::string::npos) << mistyped.text;
   const test::ShellOutput list = answer_to("conform --list");
-  EXPECT_NE(list.text.find("\nhostile-empty\n"), std::string::npos);
-  EXPECT_NE(list.text.find("pour-56k-stream  (with --all)\n"), std::string::npos);
+  EXPECT_NE(list.text.find("\nhostile-empty               wendland_c2, 0 particles, "), std::string::npos);
+  EXPECT_NE(list.text.find("\npour-56k-stream             cubic_spline, 55596 particles, 89"), std::string::npos)
+      << list.text;
+  EXPECT_NE(list.text.find("at walls  (with --all)\n"), std::string::npos);
 }
 
 }  // namespace

@@ -153,6 +153,7 @@ INSTANTIATE_TEST_SUITE_P(
                     PluginFault{"before", "run", "wrote before fluid_neighbor_count"},
                     PluginFault{"error", "run", "evaluate: out of luck"}, PluginFault{"nan", "density", ""},
                     PluginFault{"unwritten", "pressure", ""}, PluginFault{"wrong", "evaluation", "beyond tolerance"},
+                    PluginFault{"echoes", "equation_of_state", "beyond tolerance"},
                     PluginFault{"short", "substep", "beyond tolerance"}),
     [](const auto& instance) { return std::string(instance.param.name); });
 

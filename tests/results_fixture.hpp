@@ -35,7 +35,8 @@ class ResultsFile : public testing::Test {
     folder_ = std::make_unique<TemporaryFolder>();
     write_fixture(fixture_file(), answered_fixture());
     fixture_ = std::make_unique<Fixture>(read_fixture(fixture_file()));
-    oracle_ = std::make_unique<PreparedReference>(prepare_reference(*fixture_, {"fields", "substep", "conservation"}));
+    oracle_ = std::make_unique<PreparedReference>(
+        prepare_reference(*fixture_, {"fields", "substep", "conservation"}, 0, Staged::as_computed));
   }
   static void TearDownTestSuite() {
     oracle_.reset();

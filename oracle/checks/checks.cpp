@@ -5,8 +5,15 @@
 #include "reference/error.hpp"
 
 #include <algorithm>
+#include <array>
+#include <string_view>
 
 namespace decant {
+
+namespace {
+constexpr std::array<std::string_view, 7> rows_of_fields = {
+    "neighbors", "boundary_volume", "density", "pressure", "equation_of_state", "acceleration", "evaluation"};
+}
 
 const std::vector<CheckDescription>& check_descriptions() {
   static const std::vector<CheckDescription> checks = {
@@ -105,6 +112,8 @@ CheckSelection parse_checks(const std::vector<std::string>& names) {
   for (const auto& check : check_descriptions()) known += (known.empty() ? "" : ", ") + std::string(check.name);
   CheckSelection chosen;
   for (const auto& name : names) {
+    if (std::ranges::find(rows_of_fields, name) != std::end(rows_of_fields))
+      throw InputError("command line", "--check", name, "a row of the check fields; one of " + known);
     if (!all.count(name)) throw InputError("command line", "--check", name, "one of " + known);
     chosen.insert(name);
   }

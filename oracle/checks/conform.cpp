@@ -140,7 +140,18 @@ std::string ill_posed_reason(const ReferenceSolution& a) {
   return why.empty() ? why : why + "no backend can pass (a lattice? let it move first)";
 }
 
-PreparedReference prepare_reference(const Fixture& fixture, const CheckSelection& checks, int sample_every) {
+StageInputs stage_inputs(const Scene& scene, const Fields& own, Staged staged) {
+  const auto& fluid = scene.fluid;
+  const double offset =
+      staged == Staged::offset ? 0x1p-14 * fluid.rest_density * fluid.sound_speed * fluid.sound_speed : 0;
+  StageInputs inputs;
+  inputs.density = own.density.cast<float>().cast<double>();
+  inputs.pressure = (own.pressure.array() + offset).cast<float>().cast<double>();
+  return inputs;
+}
+
+PreparedReference prepare_reference(const Fixture& fixture, const CheckSelection& checks, int sample_every,
+                                    Staged staged) {
   const Scene& scene = fixture.scene;
   PreparedReference prepared;
   prepared.walls = sample_walls(scene);
@@ -148,8 +159,7 @@ PreparedReference prepare_reference(const Fixture& fixture, const CheckSelection
   const WallSolution& volumes = prepared.volumes;
   prepared.own = reference_solution(scene, prepared.walls, volumes, fixture.state);
   require_reproduced(fixture, prepared.own);
-  prepared.inputs.density = prepared.own.fields.density.cast<float>().cast<double>();
-  prepared.inputs.pressure = prepared.own.fields.pressure.cast<float>().cast<double>();
+  prepared.inputs = stage_inputs(scene, prepared.own.fields, staged);
   const auto wanted = [&](std::initializer_list<const char*> names) {
     return std::any_of(names.begin(), names.end(), [&](const char* name) { return checks.count(name) > 0; });
   };

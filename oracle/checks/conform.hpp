@@ -32,13 +32,21 @@ struct Segment {
   bool viewed = false;  // fields are evaluated too (oracle/checks/advanced_check.hpp)
 };
 
+/// Which pressure goes with the density that is handed in: the oracle's, as inputs of a port that is not linked have it
+/// (oracle/formats/results.md); or with ρ0 c0² 2⁻¹⁴ added, some hundred tolerances, so that a solver that hands back
+/// what it was given, in place of what its equation of state makes of the density, is seen.
+enum class Staged : std::uint8_t { as_computed, offset };
+
+/// The density and pressure to be handed in.
+StageInputs stage_inputs(const Scene& scene, const Fields& own, Staged staged);
+
 /// Everything the oracle has to say about one fixture. Made once, used for every backend.
 struct PreparedReference {
   std::uint32_t offers = Offer::all;  // what of the below a reference has that is not ours (measured_reference.hpp)
   Walls walls;
   WallSolution volumes;
   ReferenceSolution own;        // every stage from the stage before
-  StageInputs inputs;           // the oracle's density and pressure, rounded to fp32
+  StageInputs inputs;           // the oracle's density and pressure, rounded to fp32; see Staged
   ReferenceSolution given;      // accelerations from those inputs
   Fields own_fp32, given_fp32;  // the same source in sequential fp32
   SubstepSolution substep;
@@ -67,7 +75,7 @@ std::string ill_posed_reason(const ReferenceSolution& solution);
 /// \param sample_every  substeps between two samples of a run, for containment and mass; 0: where it is viewed,
 ///                    after half of the rest, and so on
 PreparedReference prepare_reference(const Fixture& fixture, const CheckSelection& checks = all_checks(),
-                                    int sample_every = 0);
+                                    int sample_every = 0, Staged staged = Staged::offset);
 
 /// Loads the fixture into the backend and compares; a backend that throws or reports trouble gives
 /// rows with verdict fail and the reason: one of the check `run`, and one of every check that was not made.

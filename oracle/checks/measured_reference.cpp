@@ -234,8 +234,7 @@ PreparedReference measured_reference(Backend& reference, const Fixture& fixture,
     throw BackendError("the reference " + reference.info().name + " does not offer walls");
   Measuring measuring(reference);
   prepared.own = measuring.solution(scene, prepared.walls, fixture.state);
-  prepared.inputs.density = prepared.own.fields.density.cast<float>().cast<double>();
-  prepared.inputs.pressure = prepared.own.fields.pressure.cast<float>().cast<double>();
+  prepared.inputs = stage_inputs(scene, prepared.own.fields, Staged::offset);
   if (wanted({"fields", "conservation"}) && (prepared.offers & Offer::given))
     prepared.given = measuring.solution(scene, prepared.walls, fixture.state, &prepared.inputs);
   if (wanted({"invariance"}))

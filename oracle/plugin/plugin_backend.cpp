@@ -290,6 +290,10 @@ Choice parse(const char* kind, const std::string& choice, int names) {
     at = end;
     const std::string key = option.substr(0, option.find('='));
     if (key.empty() || key.size() == option.size()) refuse("options are key=value");
+    std::string letters;
+    for (const char c : key)
+      if (std::isalpha(static_cast<unsigned char>(c))) letters += static_cast<char>(std::tolower(c));
+    if (letters == "timelimit" && key != "time_limit") refuse(key + " is no option; did you mean time_limit?");
     if (key != "time_limit") {
       out.options += (out.options.empty() ? "" : ":") + option;
       continue;
@@ -311,7 +315,8 @@ std::unique_ptr<Backend> make_plugin_backend(const std::string& choice) {
   };
   if (chosen.what.empty()) refuse("plugin:PATH of a shared library");
   std::error_code none;
-  if (!fs::is_regular_file(chosen.what, none)) refuse("a shared library (oracle/plugin/README.md)");
+  if (!fs::exists(chosen.what, none)) refuse("a shared library (oracle/plugin/README.md); there is no such file");
+  if (!fs::is_regular_file(chosen.what, none)) refuse("a shared library (oracle/plugin/README.md), not a folder");
   const std::string path = fs::absolute(chosen.what).string();
   return std::make_unique<PluginBackend>(Start{"plugin:" + path, host_program().string(), {path}}, chosen.options,
                                          chosen.limit);

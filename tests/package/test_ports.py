@@ -148,6 +148,11 @@ def test_reports_compare(tmp_path):
         decant.read_report(decant.fixture_folder() / "hostile-bowl.h5")
 
 
+def test_scenes_of_validate_come_along():
+    done = decant.command.run(["validate", "free-fall", "--quick", "--backend", "hash"], passes=(0, 1))
+    assert done.returncode == 0 and "gates met" in done.stdout, done.stdout + done.stderr
+
+
 def test_command_is_the_packages():
     command = [sys.executable, "-c", "from decant.command import main; main()"]
     done = subprocess.run([*command, "info"], capture_output=True, text=True)

@@ -3,6 +3,7 @@
 #include "oracle/plugin/examples/all_pairs.hpp"
 #include "oracle/plugin/examples/as_plugin.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
@@ -30,6 +31,7 @@ int evaluate_with_fault(void* solver, const decant_given* given, decant_fields* 
   if (fault == "beyond") out->density[out->fluid] = 1000;
   if (fault == "before") out->fluid_neighbor_count[-1] = 0;
   if (fault == "wrong") out->acceleration[0] *= 1.01;
+  if (fault == "echoes" && given) std::copy_n(given->pressure, out->fluid, out->pressure);
   if (fault == "throws") throw std::runtime_error("nobody catches this");
   return fault == "error" ? 1 : result;
 }

@@ -11,6 +11,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <utility>
 
 namespace decant {
 namespace {
@@ -72,6 +73,19 @@ std::vector<std::string> backend_choices() {
 }
 
 bool is_plugin(const std::string& choice) { return choice.starts_with("plugin:") || choice.starts_with("python:"); }
+
+void require_offers(const Backend& backend, const std::string& choice, const char* verb) {
+  constexpr std::pair<std::uint32_t, const char*> needed[] = {{Offer::density, "DENSITY"},
+                                                              {Offer::acceleration, "ACCELERATION"},
+                                                              {Offer::walls, "WALLS"},
+                                                              {Offer::step, "STEP"}};
+  std::vector<std::string> missing;
+  for (const auto& [bit, name] : needed)
+    if (!(backend.offers() & bit)) missing.emplace_back(name);
+  if (missing.empty()) return;
+  refuse("--backend", choice,
+         fmt::format("a plug-in that offers {}, which {} asks for", fmt::join(missing, ", "), verb));
+}
 
 bool names_backend(const std::string& choice) {
   const auto names = backend_choices();

@@ -37,6 +37,10 @@ struct BackendFlags {
 /// Of a solver that is built elsewhere, plugin:… or python:….
 bool is_plugin(const std::string& choice);
 
+/// Throws InputError naming what a plug-in does not offer of what a verb asks it for. \param choice  as on the command
+/// line
+void require_offers(const Backend& backend, const std::string& choice, const char* verb);
+
 /// Whether a backend of that name there is, or it is a plug-in; a file's name is neither.
 bool names_backend(const std::string& choice);
 

@@ -203,8 +203,10 @@ int bench(BenchArguments& arguments) {
     names = backend_choices();
     if (arguments.executor == "cuda") std::erase(names, "reference");
   }
-  for (const auto& name : names)
+  for (const auto& name : names) {
     backends.push_back(choose_backend(arguments.flags.applied_to(name), arguments.executor));
+    require_offers(*backends.back(), name, "bench");
+  }
   arguments.flags.require_used();
   std::vector<std::filesystem::path> files;
   for (const auto& given : arguments.fixtures) files.push_back(recording_called(given));

@@ -5,9 +5,11 @@
 #include "oracle/checks/measured_reference.hpp"
 #include "oracle/files/file_aside.hpp"
 #include "oracle/files/fixture_file.hpp"
+#include "oracle/files/hdf5_io.hpp"
 #include "oracle/files/report_file.hpp"
 #include "oracle/report/console_table.hpp"
 #include "reference/error.hpp"
+#include "reference/scene_file.hpp"
 #include "tools/commands/backend_choice.hpp"
 #include "tools/commands/check_results_file.hpp"
 #include "tools/commands/commands.hpp"
@@ -81,7 +83,12 @@ std::vector<Candidate> candidates_of(ConformArguments& arguments) {
 /// The reference where it is not ours: what --oracle names in place of a file.
 std::unique_ptr<Backend> own_reference(const ConformArguments& arguments) {
   if (!names_backend(arguments.oracle)) return nullptr;
-  std::unique_ptr<Backend> reference = choose_backend(arguments.oracle, "auto");
+  std::unique_ptr<Backend> reference;
+  try {
+    reference = choose_backend(arguments.oracle, "auto");
+  } catch (const InputError& error) {
+    throw InputError(error.file(), error.key() == "--backend" ? "--oracle" : error.key(), error.value(), error.bound());
+  }
   if (const std::string precision = reference->info().precision; precision != "fp64")
     throw InputError("command line", "--oracle", arguments.oracle,
                      fmt::format("a reference in fp64; this one computes in {}", precision));
@@ -144,12 +151,19 @@ int status_of(const Report& report, const std::vector<Candidate>& candidates) {
   return status == exit_failure && absent && only_the_device ? exit_device_absent : status;
 }
 
-/// Names of all recordings, those of study scale marked.
+/// Names of all recordings with what decides whether a port can be asked about them; those of study scale marked.
 int list_recordings() {
   const auto small = fixtures_in(fixture_folder(), false);
-  for (const auto& file : fixtures_in(fixture_folder(), true))
-    fmt::print("{}{}\n", file.stem().string(),
-               std::find(small.begin(), small.end(), file) == small.end() ? "  (with --all)" : "");
+  for (const auto& file : fixtures_in(fixture_folder(), true)) {
+    const Hdf5Reader in(file);
+    const Scene scene = parse_scene(in.text("/scene"), file.string());
+    std::string about = fmt::format("{}, {} particles", to_string(scene.kernel), in.shape("/state/position").at(0));
+    if (const std::int64_t walls = in.integer_attribute("/walls", "count"))
+      about += fmt::format(", {} at walls", walls);
+    if (std::ranges::any_of(scene.domain.periodic, [](bool wraps) { return wraps; })) about += ", periodic";
+    if (std::find(small.begin(), small.end(), file) == small.end()) about += "  (with --all)";
+    fmt::print("{:<28}{}\n", file.stem().string(), about);
+  }
   return exit_pass;
 }
 
@@ -288,7 +302,8 @@ void add_conform_command(CLI::App& app, int& exit_status) {
   verb->add_option("--kernel", arguments->kernel,
                    "judge the recorded states with this kernel in place of their own: cubic_spline, wendland_c2 or "
                    "mueller2003");
-  verb->add_flag("--list", arguments->list, "print the names of all recordings; judges nothing");
+  verb->add_flag("--list", arguments->list,
+                 "print all recordings with kernel, particles, walls, periods; judges nothing");
   verb->add_option("--backend", arguments->backends, "brute,…, plugin:PATH, python:FILE:CLASS; default: all under test")
       ->delimiter(',')
       ->allow_extra_args(false);

@@ -30,7 +30,7 @@ constexpr const char* export_footer =
 int export_inputs(const ExportArguments& arguments) {
   check_output_place("--out", arguments.out);
   const Fixture fixture = read_fixture(recording_called(arguments.fixture));
-  const auto oracle = std::make_unique<const PreparedReference>(prepare_reference(fixture, {}));
+  const auto oracle = std::make_unique<const PreparedReference>(prepare_reference(fixture, {}, 0, Staged::as_computed));
   write_port_inputs(arguments.out, fixture, *oracle);
   fmt::print("{}: {} particles, {} wall particles of {}\n", arguments.out, fixture.state.size(), oracle->walls.size(),
              fixture.name);

@@ -4,6 +4,7 @@
 
 #include "oracle/files/hdf5_io.hpp"
 #include "reference/error.hpp"
+#include "tools/commands/help_text.hpp"
 
 #include <algorithm>
 #include <cstdlib>
@@ -67,7 +68,15 @@ fs::path recording_called(const std::string& given) {
     const fs::path folder = fixture_folder();
     for (const fs::path& file : {folder / given, folder / (given + ".h5")})
       if (fs::is_regular_file(file)) return file;
-  } catch (const InputError&) {  // no such folder: reading the file says so
+    std::vector<std::string> names;
+    for (const fs::path& file : recordings(folder)) names.push_back(file.stem().string());
+    const std::string meant = nearest_name(given, names);
+    if (!meant.empty())
+      throw InputError("command line", "FIXTURE", given,
+                       "no file, and no recording of that name; did you mean " + meant + "?");
+  } catch (const InputError& error) {
+    if (error.key() == "FIXTURE" && error.value() == given) throw;
+    // No such folder: reading the file says so.
   }
   return given;
 }

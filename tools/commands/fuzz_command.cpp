@@ -73,7 +73,11 @@ void run(FuzzArguments& arguments, int& exit_status) {
   check_output_place("--report", arguments.report);
   const auto make = [&](const std::string& choice) { return choose_backend(choice, arguments.executor); };
   BackendInfo info;
-  for (const auto& name : arguments.backends) info = make(name)->info();
+  for (const auto& name : arguments.backends) {
+    const auto backend = make(name);
+    require_offers(*backend, name, "fuzz");
+    info = backend->info();
+  }
 
   fuzz::Settings settings;
   settings.backends = arguments.backends;

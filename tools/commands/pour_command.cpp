@@ -72,6 +72,7 @@ int run(PourArguments& arguments) {
   keep_freed_memory();
   const Scene scene = scene_of(arguments);
   const auto backend = choose_backend(arguments.flags.applied_to(arguments.backend), arguments.executor);
+  require_offers(*backend, arguments.backend, "pour");
   arguments.flags.require_used();
   const StopSignal signal;
   const BackendInfo info = backend->info();

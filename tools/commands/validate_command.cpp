@@ -88,6 +88,7 @@ void run(ValidateArguments& arguments, int& exit_status) {
   const auto fixtures = fixture_folder();
   const auto backend = choose_backend(arguments.flags.applied_to(arguments.backend), arguments.executor);
   arguments.flags.require_used();
+  require_offers(*backend, arguments.backend, "validate");
   std::vector<std::pair<const validate::Case*, int>> runs;
   for (const validate::Case* which : chosen)
     for (const int resolution : resolutions_of(*which, arguments, backend->info().executor))

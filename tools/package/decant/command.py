@@ -23,7 +23,7 @@ def fixture_folder() -> Path:
 
 def scene_folder() -> Path:
     """The scenes that come with the package."""
-    return PACKAGE / "share" / "decant" / "scenes"
+    return fixture_folder() / "scenes"
 
 
 def environment() -> dict[str, str]:
