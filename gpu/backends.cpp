@@ -175,6 +175,12 @@ std::string executor_device(Executor executor) {
   return executor == Executor::host ? gpu::host::device() : std::string();
 }
 
+void start_profiler() {
+#if DECANT_HAS_CUDA
+  if (executor_available(Executor::cuda)) gpu::cuda::start_profiler();
+#endif
+}
+
 std::string thrust_version() { return gpu::host::thrust_version(); }
 
 std::unique_ptr<Backend> backend_around(std::string name, Executor executor, std::string options,

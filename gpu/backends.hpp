@@ -27,6 +27,9 @@ bool executor_available(Executor executor, std::string* why_not = nullptr);
 /// What the executor runs on: "NVIDIA H200, driver 13.0, sm_90" or "8 OpenMP threads".
 std::string executor_device(Executor executor);
 
+/// From here on a profiler that waits for it looks at kernels; without CUDA nothing happens.
+void start_profiler();
+
 /// Of the host executor: "2.3.1".
 std::string thrust_version();
 

@@ -3,6 +3,8 @@
 #include "gpu/core/cuda_check.hpp"
 #include "gpu/solver/device_solver.hpp"
 
+#include <cuda_profiler_api.h>
+
 namespace decant::gpu::cuda {
 
 std::string device(std::string* why_not) {
@@ -21,5 +23,7 @@ std::string device(std::string* why_not) {
          std::to_string(driver % 1000 / 10) + ", sm_" + std::to_string(properties.major) +
          std::to_string(properties.minor);
 }
+
+void start_profiler() { CUDA_CHECK(cudaProfilerStart()); }
 
 }  // namespace decant::gpu::cuda

@@ -78,6 +78,7 @@ namespace cuda {
 DECANT_BACKENDS(DECANT_DECLARE)
 /// Empty where no device can be used; `why_not` says why.
 std::string device(std::string* why_not);
+void start_profiler();
 }  // namespace cuda
 #undef DECANT_DECLARE
 

@@ -1,6 +1,7 @@
 /// \file
 /// `decant bench`: what a substep costs each backend at recorded states. What does not conform is
 /// not timed.
+#include "gpu/backends.hpp"
 #include "oracle/checks/conform.hpp"
 #include "oracle/files/file_aside.hpp"
 #include "oracle/files/fixture_file.hpp"
@@ -14,6 +15,7 @@
 #include "tools/commands/fixture_folder.hpp"
 #include "tools/commands/interruptible.hpp"
 #include "tools/commands/output_place.hpp"
+#include "tools/commands/profile.hpp"
 
 #include <fmt/format.h>
 
@@ -24,6 +26,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace decant {
@@ -33,7 +36,7 @@ struct BenchArguments {
   BackendFlags flags;
   std::vector<std::string> fixtures, backends, reports;
   std::string executor = "auto";
-  bool json = false;
+  bool json = false, profile = false, profile_child = false;
   int substeps = 0, windows = 5, refine = 0;
 };
 
@@ -46,13 +49,17 @@ constexpr const char* bench_footer =
     "the recording is not timed. --refine K makes eight particles of each, K times, and lets the first\n"
     "backend that conforms settle them for a while: sizes that no recording has. The recording is what\n"
     "is judged.\n"
+    "--profile runs ncu on this command, plug-ins included, and tells the last launch of each kernel in two\n"
+    "calls of one substep. Every launch is repeated for each group of counters. A persistent kernel is one\n"
+    "launch; list:launch=stream and hash:launch=stream show its parts.\n"
     "Exit status: 0 timed, 1 something does not conform, 2 bad input, 3 a backend failed,\n"
     "77 the device of --executor is absent, 130 after Ctrl-C (143: SIGTERM): what was timed by then is kept.\n"
     "\n"
     "Examples:\n"
     "  decant bench --backend brute,hash,list --executor cuda \\\n"
     "    --report build/bench.json\n"
-    "  decant bench pour-4k-stream --backend hash,hash:sort=thrust,list:skin=0.1";
+    "  decant bench pour-4k-stream --backend hash,hash:sort=thrust,list:skin=0.1\n"
+    "  decant bench pour-4k-stream --backend list:launch=stream,plugin:./mine.so --profile";
 
 // Seconds that a window takes, about, where --substeps leaves it open.
 constexpr double usual_window = 0.1;
@@ -195,7 +202,50 @@ BenchRow time_backend(Backend& backend, const Fixture& fixture, const Walls& wal
   return row;
 }
 
+/// What ncu looks at.
+int be_profiled(const BenchArguments& arguments) {
+  const auto backend = choose_backend(arguments.backends.at(0), arguments.executor);
+  const Fixture fixture = read_fixture(recording_called(arguments.fixtures.at(0)));
+  backend->load(fixture.scene, sample_walls(fixture.scene), fixture.state);
+  start_profiler();
+  for (const int substeps : profile::calls) require_ok(*backend, backend->advance(substeps));
+  return exit_pass;
+}
+
+/// Kernels of every backend on every recording, by their counters.
+int bench_counters(BenchArguments& arguments) {
+  if (arguments.substeps > 0 || arguments.refine > 0 || !arguments.reports.empty())
+    throw InputError("command line", "--profile", "given", "without --substeps, --refine and --report");
+  std::vector<std::string> names = arguments.backends;
+  if (names.empty()) {
+    names = backend_choices();
+    std::erase(names, "reference");
+  }
+  for (std::string& name : names) {
+    name = arguments.flags.applied_to(name);
+    require_offers(*choose_backend(name, arguments.executor), name, "bench");
+  }
+  arguments.flags.require_used();
+  if (arguments.fixtures.empty())
+    throw InputError("command line", "FIXTURE", "none", "the recording to profile on, as pour-4k-stream");
+  std::string separator = "[";
+  for (const std::string& given : arguments.fixtures) {
+    const std::string file = recording_called(given).string();
+    for (const std::string& name : names) {
+      const auto kernels = profile::of_backend(file, name, arguments.executor);
+      const std::string recording = std::filesystem::path(file).stem().string();
+      if (arguments.json) fmt::print("{}{}", std::exchange(separator, ",\n"), profile::json(recording, name, kernels));
+      else fmt::print("{} on {}, the last launch of each kernel\n{}\n", name, recording, profile::table(kernels));
+      std::fflush(stdout);
+    }
+  }
+  if (arguments.json) fmt::print("]\n");
+  return exit_pass;
+}
+
 int bench(BenchArguments& arguments) {
+  if (arguments.profile_child) return be_profiled(arguments);
+  if (arguments.profile) return bench_counters(arguments);
   for (const std::string& report : arguments.reports) check_output_place("--report", report);
   std::vector<std::unique_ptr<Backend>> backends;
   auto names = arguments.backends;
@@ -296,6 +346,9 @@ void add_bench_command(CLI::App& app, int& exit_status) {
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   verb->add_option("--refine", arguments->refine, "eight particles for one, so many times")->check(CLI::Range(0, 4));
+  verb->add_flag("--profile", arguments->profile,
+                 "in place of times what the GPU's counters say of each kernel, by Nsight Compute (ncu)");
+  verb->add_flag("--profile-child", arguments->profile_child)->group("");
   verb->add_flag("--json", arguments->json, "rows as JSON instead of the table");
   verb->add_option("--report", arguments->reports, "write rows: as JSON where the name ends in .json, else as HDF5")
       ->allow_extra_args(false);
