@@ -55,6 +55,17 @@ TEST(Profile, IsTheLastLaunchOfEachKernel) {
   EXPECT_EQ(json.find("registers"), std::string::npos) << "what was not counted is left out";
 }
 
+TEST(Profile, NamesKernelsWhateverNcuMakesOfUnnamedNamespaces) {
+  const auto name = [](const std::string& raw) {
+    return profile::kernels_in("\"ID\",\"Kernel Name\"\n\"0\",\"" + raw + "\"\n").at(0).name;
+  };
+  EXPECT_EQ(name("void unnamed>::density_kernel<unnamed>::TileTeam, unnamed>::BruteNeighbors<(bool)0>>(int)"),
+            "density_kernel<TileTeam, BruteNeighbors<0>>");
+  EXPECT_EQ(name("void decant::gpu::<unnamed>::force_kernel<<unnamed>::SubWarp<(int)8>, decant::<unnamed>::A>(int)"),
+            "force_kernel<SubWarp<8>, A>");
+  EXPECT_EQ(name("<unnamed>::build(float *)"), "build");
+}
+
 TEST(Profile, OfNoTableIsAnError) { EXPECT_THROW((void)profile::kernels_in("==ERROR== no\n"), BackendError); }
 
 /// A program in ncu's place, and what the command says.

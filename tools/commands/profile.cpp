@@ -58,6 +58,7 @@ const std::array<const char*, 11> stalls = {"long_scoreboard", "short_scoreboard
 
 namespace {
 
+constexpr std::size_t longest_name = 60;
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
 
 std::string stall_metric(const char* name) {
@@ -85,12 +86,15 @@ double number(std::string text) {
   return text.empty() || *end != '\0' ? none : value;
 }
 
-/// "density_kernel<SubWarp<2>, …>" of a demangled name with namespaces, types of parameters and casts.
+/// "density_kernel<SubWarp<2>, …>" of a demangled name with namespaces, types of parameters and casts. ncu writes an
+/// unnamed namespace in full, "decant::<unnamed>::SubWarp", or without its bracket, "density_kernel<unnamed>::TileTeam".
 std::string short_name(const std::string& name) {
-  static const std::regex noise(
-      R"(decant::|gpu::|cuda::|<unnamed>::|\(anonymous namespace\)::|void |\(int\)|\(bool\))");
-  const std::string plain = std::regex_replace(name, noise, "");
-  return plain.substr(0, plain.find('('));
+  static const std::regex whole(R"((::|^|[ ,<])<unnamed>::)"), half("unnamed>::");
+  static const std::regex noise(R"(decant::|gpu::|cuda::|\(anonymous namespace\)::|void |\(int\)|\(bool\))");
+  std::string plain = std::regex_replace(std::regex_replace(name, whole, "$1"), half, "");
+  plain = std::regex_replace(plain, noise, "");
+  plain = plain.substr(0, plain.find('('));
+  return plain.size() > longest_name ? plain.substr(0, longest_name - 1) + "…" : plain;
 }
 
 std::string quoted(const std::string& word) {

@@ -272,7 +272,18 @@ def gates():
     return table(["case", "gates met", "missed", "reported without a gate"], shown) + source(path, device, revision)
 
 
+def study():
+    from plot_profile import Profile, table as beside_published  # here: it draws, too
+
+    file = RESULTS / "h200" / "study" / "profile.h5"
+    profile = Profile(file)
+    where = f"Frame {profile.common_frame()} of {profile.about['scene']} where no other is named."
+    return f"{beside_published(profile)}\n\n{where}" + source(file, device_of(profile.about["device"]),
+                                                              profile.about["git_revision"])
+
+
 TABLES = {
+    "study": study,
     "verdicts": verdicts,
     "substep-times": substep_times,
     "scaling": scaling,
@@ -304,7 +315,9 @@ def main():
         print("\n".join(TABLES))
         return 0
     documents = arguments.document or [
-        p for folder in ("*.md", "*/*.md", "fixtures/results/*.md") for p in sorted(ROOT.glob(folder))
+        p
+        for folder in ("*.md", "*/*.md", "fixtures/results/*.md", "fixtures/results/*/study/*.md")
+        for p in sorted(ROOT.glob(folder))
     ]
     differ = 0
     for path in documents:
