@@ -60,6 +60,12 @@ def record_states(arguments, folder):
     return files
 
 
+def coarse_to_fine(items):
+    """The first, the middle, the quarters, …, so that what there is after an interruption spans the whole."""
+    width = max(1, (len(items) - 1).bit_length())
+    return [items[k] for k in sorted(range(len(items)), key=lambda k: f"{k:0{width}b}"[::-1])]
+
+
 def plain(name):
     return re.sub(r"[^A-Za-z0-9.=_-]", "-", name)
 
@@ -104,8 +110,8 @@ def main():
     files = record_states(arguments, arguments.folder)
     backends = arguments.backend or BACKENDS
     done, missing = [], 0
-    # State by state, so that what is there after an interruption spans all backends.
-    for frame, state in files.items():
+    # State by state, so that what is there after an interruption is of all backends.
+    for frame, state in coarse_to_fine(list(files.items())):
         for backend in backends:
             file = arguments.folder / "runs" / f"{frame:04}-{plain(backend)}.json"
             if not file.is_file() and time.monotonic() - start < arguments.seconds:
@@ -122,7 +128,7 @@ def main():
             else:
                 missing += 1
     if done:
-        gather(arguments.folder, done, {"scene": arguments.scene.name, "device": device,
+        gather(arguments.folder, sorted(done, key=lambda one: one[0]), {"scene": arguments.scene.name, "device": device,
                                         "git_revision": info["git_revision"]})
     total = len(files) * len(backends)
     print(f"{len(done)} of {total} profiles in {arguments.folder / 'profile.h5'}, {time.monotonic() - start:.0f} s"
