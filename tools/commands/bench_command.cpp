@@ -59,7 +59,7 @@ constexpr const char* bench_footer =
     "  decant bench --backend brute,hash,list --executor cuda \\\n"
     "    --report build/bench.json\n"
     "  decant bench pour-4k-stream --backend hash,hash:sort=thrust,list:skin=0.1\n"
-    "  decant bench pour-4k-stream --backend list:launch=stream,plugin:./mine.so --profile";
+    "  decant bench pour-4k-stream --backend list,plugin:./mine.so --profile";
 
 // Seconds that a window takes, about, where --substeps leaves it open.
 constexpr double usual_window = 0.1;

@@ -40,8 +40,8 @@ class Profile:
 
     def __init__(self, path):
         with open_hdf5(path, ["decant_profile"], "a profile of profile_pour.py") as file:
-            self.columns = {name: item[:] for name, item in file.items()}
-            self.about = {name: value.decode() for name, value in file.attrs.items() if name != "decant_profile"}
+            self.columns = {name: item[:] for name, item in file.items() if name != "provenance"}
+            self.about = {name: value.decode() for name, value in file["provenance"].attrs.items()}
         for name in ("backend", "kernel"):
             self.columns[name] = np.char.decode(self.columns[name], "utf-8")
         self.columns["stage"] = np.array([stage_of(kernel) for kernel in self.columns["kernel"]])

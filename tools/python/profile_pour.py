@@ -78,8 +78,9 @@ def gather(folder, done, provenance):
     aside = folder / f".profile.{os.getpid()}"
     with h5py.File(aside, "w", libver="v108") as out:
         out.attrs["decant_profile"] = np.int64(1)
+        about = out.create_group("provenance")
         for key, value in provenance.items():
-            out.attrs[key] = np.bytes_(value)
+            about.attrs[key] = np.bytes_(value)
         out["frame"] = np.array([frame for frame, *_ in rows], np.int64)
         for name, values in (("backend", [b for _, b, _ in rows]), ("kernel", [k["kernel"] for *_, k in rows])):
             out[name] = np.array([v.encode() for v in values])
