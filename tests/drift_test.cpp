@@ -4,12 +4,12 @@
 #include "oracle/files/fixture_file.hpp"
 
 #include "oracle/files/hdf5_io.hpp"
+#include "oracle/files/temporary_folder.hpp"
 #include "reference/error.hpp"
 #include "reference/sampling.hpp"
 #include "tests/falling_points.hpp"
 #include "tests/python.hpp"
 #include "tests/random_scene.hpp"
-#include "tests/temporary_folder.hpp"
 #include "tools/commands/backend_choice.hpp"
 
 #include <gtest/gtest.h>
@@ -220,7 +220,7 @@ TEST(Drift, OfWholePoursIsNothingForTheSameListAndSomethingForAnother) {
 
 TEST(Drift, ReportIsAsDocumented) {
   if (!test::python_has("h5py")) GTEST_SKIP() << "no h5py in " << test::python();
-  const test::TemporaryFolder folder;
+  const TemporaryFolder folder;
   const auto file = folder / "drift.h5";
   drift::PourResult pour{"scene", {{0.5, measured().samples[3]}}, {drift::WholePour{}}};
   for (const auto& pours : {std::vector<drift::PourResult>{}, std::vector{pour}}) {
@@ -290,7 +290,7 @@ class Series : public testing::Test {
     return "none";
   }
 
-  test::TemporaryFolder folder_;
+  TemporaryFolder folder_;
   Fixture fixture_;
   Walls walls_;
   WallSolution volumes_;

@@ -4,10 +4,10 @@
 
 #include "oracle/checks/audit.hpp"
 #include "oracle/files/hdf5_io.hpp"
+#include "oracle/files/temporary_folder.hpp"
 #include "reference/error.hpp"
 #include "tests/falling_points.hpp"
 #include "tests/file_bytes.hpp"
-#include "tests/temporary_folder.hpp"
 #include "tools/frames/csv_writer.hpp"
 #include "tools/frames/make_frame.hpp"
 #include "tools/frames/xdmf.hpp"
@@ -22,8 +22,6 @@
 
 namespace decant {
 namespace {
-
-using test::TemporaryFolder;
 
 constexpr std::int64_t particles = 7;
 

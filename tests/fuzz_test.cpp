@@ -2,7 +2,7 @@
 /// Fuzzing itself: cases are sound and of all kinds, faults are found and minimised, campaigns are the
 /// same however they are run.
 #include "oracle/files/fixture_file.hpp"
-#include "tests/temporary_folder.hpp"
+#include "oracle/files/temporary_folder.hpp"
 #include "tools/fuzz/campaign.hpp"
 
 #include "oracle/checks/conform.hpp"
@@ -159,7 +159,7 @@ std::unique_ptr<Backend> with_a_fault(const std::string&) {
 }
 
 TEST(Campaign, ShrinksAFaultToWhatShowsItAndWritesThatDown) {
-  const test::TemporaryFolder folder;
+  const TemporaryFolder folder;
   Settings s = settings_of(20, {"fields"});
   s.backends = {"reference"};
   s.failures = folder / "failing";
@@ -206,7 +206,7 @@ TEST(Campaign, HandsOnWhatABackendThrows) {
 
 TEST(Campaign, ReportsAreAsDocumentedAndMerge) {
   if (!test::python_has("h5py")) GTEST_SKIP() << "no h5py in " << test::python();
-  const test::TemporaryFolder folder;
+  const TemporaryFolder folder;
   Settings s = settings_of(6, {"fields", "refusal"});
   const auto a = folder / "a.h5", b = folder / "b.h5", all = folder / "all.h5";
   const BackendInfo info{"hash", "", "host", "here", "fp32"};

@@ -1,9 +1,9 @@
 /// \file
 /// Files appear whole or not at all, come back bitwise, and are never believed.
 #include "oracle/files/hdf5_io.hpp"
+#include "oracle/files/temporary_folder.hpp"
 #include "reference/error.hpp"
 #include "tests/file_bytes.hpp"
-#include "tests/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 
@@ -30,7 +30,7 @@ class Hdf5Io : public testing::Test {
     return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_.path()), fs::directory_iterator()));
   }
 
-  test::TemporaryFolder folder_;
+  TemporaryFolder folder_;
 };
 
 using test::bytes_of;

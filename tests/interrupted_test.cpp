@@ -1,7 +1,7 @@
 /// \file
 /// Long work that is told to stop keeps what it has done.
 #include "oracle/files/report_file.hpp"
-#include "tests/temporary_folder.hpp"
+#include "oracle/files/temporary_folder.hpp"
 #include "tools/commands/interruptible.hpp"
 
 #include "oracle/files/file_aside.hpp"
@@ -25,7 +25,6 @@ namespace decant {
 namespace {
 
 namespace fs = std::filesystem;
-using test::TemporaryFolder;
 
 using test::bytes_of;
 

@@ -3,8 +3,8 @@
 #include "tools/commands/junit.hpp"
 
 #include "oracle/files/file_aside.hpp"
+#include "oracle/files/temporary_folder.hpp"
 #include "tests/python.hpp"
-#include "tests/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 
@@ -93,7 +93,7 @@ TEST(XmlText, KeepsTextAndReplacesWhatXmlCannotHold) {
 
 TEST(Junit, IsReadByAnXmlParserWithEveryCharacterInItsPlace) {
   if (!test::python_has("xml.etree")) GTEST_SKIP() << "no " << test::python();
-  const test::TemporaryFolder folder;
+  const TemporaryFolder folder;
   CheckRow awkward = row("b<r>", "density", "den\"sity'", 31);
   awkward.reason = "]]> & <!-- \x1b ρ \xff";
   write_text_file(folder / "junit.xml", junit_xml({{awkward, row("brute", "density", "density", 0.5), not_run("list")},

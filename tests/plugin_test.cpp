@@ -5,12 +5,12 @@
 #include "gpu/backends.hpp"
 #include "oracle/checks/conform.hpp"
 #include "oracle/files/fixture_file.hpp"
+#include "oracle/files/temporary_folder.hpp"
 #include "oracle/plugin/plugin_backend.hpp"
 #include "oracle/report/console_table.hpp"
 #include "reference/error.hpp"
 #include "reference/neighbors.hpp"
 #include "reference/sampling.hpp"
-#include "tests/temporary_folder.hpp"
 #include "tools/commands/backend_choice.hpp"
 #include "tools/fuzz/campaign.hpp"
 
@@ -211,7 +211,7 @@ TEST(Plugin, ThatIsNoneIsRefusedInWords) {
 }
 
 TEST(Plugin, ThatCrashesDoesNotEndACampaign) {
-  const test::TemporaryFolder folder;
+  const TemporaryFolder folder;
   fuzz::Settings settings;
   const std::string sound = "plugin:" + plugin_file("all_pairs");
   const std::string crashing = "plugin:" + plugin_file("faulty") + ":fault=crash";

@@ -1,7 +1,7 @@
 /// \file
 /// A pour that is stopped, killed or failed, and what it leaves behind.
 #include "oracle/files/fixture_file.hpp"
-#include "tests/temporary_folder.hpp"
+#include "oracle/files/temporary_folder.hpp"
 #include "tools/pour/pour.hpp"
 
 #include "oracle/files/hdf5_io.hpp"
@@ -30,7 +30,6 @@ namespace {
 namespace fs = std::filesystem;
 using test::FallingPoints;
 using test::pour_command;
-using test::TemporaryFolder;
 
 pour::Options quiet_options(const fs::path& out) {
   pour::Options options;

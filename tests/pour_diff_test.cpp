@@ -3,9 +3,9 @@
 #include "tools/pour/pour_diff.hpp"
 
 #include "oracle/files/hdf5_io.hpp"
+#include "oracle/files/temporary_folder.hpp"
 #include "reference/error.hpp"
 #include "tests/falling_points.hpp"
-#include "tests/temporary_folder.hpp"
 #include "tools/pour/pour.hpp"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::FallingPoints;
-using test::TemporaryFolder;
 
 /// Falling points whose velocity changes by `kick` (m/s) at a substep.
 class Kicked : public FallingPoints {

@@ -3,10 +3,10 @@
 #include "tools/pour/limits.hpp"
 
 #include "gpu/backends.hpp"
+#include "oracle/files/temporary_folder.hpp"
 #include "reference/scene_checks.hpp"
 #include "reference/shapes.hpp"
 #include "tests/falling_points.hpp"
-#include "tests/temporary_folder.hpp"
 #include "tools/pour/pour.hpp"
 #include "tools/pour/pour_report.hpp"
 
@@ -20,7 +20,6 @@ namespace decant {
 namespace {
 
 using test::FallingPoints;
-using test::TemporaryFolder;
 
 TEST(Limits, AreTheSpeedThatTheStepIsDerivedForAQuarterOfSoundAndItsCompression) {
   Scene scene = test::falling_points_scene();

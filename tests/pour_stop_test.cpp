@@ -5,12 +5,12 @@
 #include "gpu/backends.hpp"
 #include "oracle/files/file_aside.hpp"
 #include "oracle/files/hdf5_io.hpp"
+#include "oracle/files/temporary_folder.hpp"
 #include "reference/error.hpp"
 #include "reference/scene_file.hpp"
 #include "tests/falling_points.hpp"
 #include "tests/file_bytes.hpp"
 #include "tests/pour_arguments.hpp"
-#include "tests/temporary_folder.hpp"
 #include "tools/commands/commands.hpp"
 #include "tools/common/stop_signal.hpp"
 #include "tools/pour/checkpoint.hpp"
@@ -33,7 +33,6 @@ namespace {
 namespace fs = std::filesystem;
 using test::FallingPoints;
 using test::pour_command;
-using test::TemporaryFolder;
 
 using test::bytes_of;
 

@@ -3,8 +3,8 @@
 /// ncu 2025.3 prints it, with other numbers.
 #include "tools/commands/profile.hpp"
 
+#include "oracle/files/temporary_folder.hpp"
 #include "tests/shell_output.hpp"
-#include "tests/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 
@@ -70,7 +70,7 @@ TEST(Profile, OfNoTableIsAnError) { EXPECT_THROW((void)profile::kernels_in("==ER
 
 /// A program in ncu's place, and what the command says.
 test::ShellOutput with_ncu(const std::string& script, const std::string& arguments) {
-  const test::TemporaryFolder folder;
+  const TemporaryFolder folder;
   const std::filesystem::path program = folder / "ncu";
   std::ofstream(program) << "#!/bin/sh\n" << script;
   std::filesystem::permissions(program, std::filesystem::perms::owner_all);

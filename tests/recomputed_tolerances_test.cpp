@@ -4,18 +4,18 @@
 #include "oracle/checks/conform.hpp"
 #include "oracle/files/port_inputs.hpp"
 #include "oracle/files/report_file.hpp"
+#include "oracle/files/temporary_folder.hpp"
 #include "tests/edited_reference.hpp"
 #include "tests/forms.hpp"
 #include "tests/python.hpp"
 #include "tests/results_fixture.hpp"
-#include "tests/temporary_folder.hpp"
 
 namespace decant {
 namespace {
 
 /// What the script says of the tolerances in a report in which every value is wrong, so that all are kept.
 int status_of(const Fixture& fixture) {
-  const test::TemporaryFolder folder;
+  const TemporaryFolder folder;
   const std::filesystem::path inputs = folder / "inputs.h5", file = folder / "report.h5";
   const PreparedReference oracle = prepare_reference(fixture, {"fields"});
   write_port_inputs(inputs, fixture, oracle);

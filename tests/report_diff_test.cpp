@@ -3,10 +3,10 @@
 #include "oracle/report/report_diff.hpp"
 #include "oracle/files/report_file.hpp"
 
+#include "oracle/files/temporary_folder.hpp"
 #include "reference/error.hpp"
 #include "reference/scene.hpp"
 #include "tests/special_values.hpp"
-#include "tests/temporary_folder.hpp"
 #include "tools/commands/commands.hpp"
 
 #include <gtest/gtest.h>
@@ -162,7 +162,7 @@ int diff_command(const std::vector<std::string>& arguments, std::string* out = n
 }
 
 TEST(DiffCommand, ExitsWithOneWhereSomethingGotWorse) {
-  const test::TemporaryFolder folder;
+  const TemporaryFolder folder;
   const std::string good = (folder / "good.h5").string(), bad = (folder / "bad.h5").string();
   write_report(good, {{row("density", 0.5)}, {}});
   write_report(bad, {{row("density", 31)}, {}});
@@ -177,7 +177,7 @@ TEST(DiffCommand, ExitsWithOneWhereSomethingGotWorse) {
 }
 
 TEST(DiffCommand, SaysThatNamesDifferAndHowToPairThem) {
-  const test::TemporaryFolder folder;
+  const TemporaryFolder folder;
   const std::string hash = (folder / "hash.h5").string(), mine = (folder / "mine.h5").string();
   CheckRow its = row("density", 31, "mine");
   its.executor = "";
@@ -202,7 +202,7 @@ TEST(DiffCommand, SaysThatNamesDifferAndHowToPairThem) {
 }
 
 TEST(DiffCommand, RefusesWhatIsNoReportAndAFactorBelowOne) {
-  const test::TemporaryFolder folder;
+  const TemporaryFolder folder;
   const std::string good = (folder / "good.h5").string();
   write_report(good, {{row("density", 0.5)}, {}});
   EXPECT_THROW(diff_command({good, (folder / "none.h5").string()}), InputError);

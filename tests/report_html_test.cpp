@@ -1,11 +1,11 @@
 /// \file
 /// The page of tools/python/report_html.py holds what the report does, and needs nothing from elsewhere.
 #include "oracle/files/report_file.hpp"
+#include "oracle/files/temporary_folder.hpp"
 #include "oracle/report/report.hpp"
 #include "reference/state.hpp"
 #include "tests/file_bytes.hpp"
 #include "tests/python.hpp"
-#include "tests/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 
@@ -79,7 +79,7 @@ class ReportPage : public testing::Test {
     return test::run_python({DECANT_SOURCE_DIR "/tools/python/report_html.py", (folder_ / "report.h5").string()});
   }
   std::string page() { return test::bytes_of(folder_ / "report.html"); }
-  test::TemporaryFolder folder_;
+  TemporaryFolder folder_;
 };
 
 TEST_F(ReportPage, NamesEveryFixtureAndFailureAndNeedsNothingFromElsewhere) {

@@ -3,10 +3,10 @@
 #include "oracle/report/report.hpp"
 #include "oracle/files/hdf5_io.hpp"
 #include "oracle/files/report_file.hpp"
+#include "oracle/files/temporary_folder.hpp"
 #include "oracle/report/console_table.hpp"
 #include "reference/error.hpp"
 #include "tests/special_values.hpp"
-#include "tests/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 #include <hdf5.h>
@@ -64,7 +64,7 @@ CheckRow with_arrays(CheckRow r, Eigen::Index n) {
 
 class ReportFile : public testing::Test {
  protected:
-  test::TemporaryFolder folder_;
+  TemporaryFolder folder_;
   const fs::path file_ = folder_ / "report.h5";
 };
 

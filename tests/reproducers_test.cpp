@@ -7,8 +7,8 @@
 
 #include "oracle/checks/conform.hpp"
 #include "oracle/checks/neighborhood.hpp"
+#include "oracle/files/temporary_folder.hpp"
 #include "tests/edited_reference.hpp"
-#include "tests/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 
@@ -21,7 +21,6 @@ namespace {
 
 using test::Edit;
 using test::EditedReference;
-using test::TemporaryFolder;
 
 const Fixture& recorded() {
   static const Fixture fixture = [] {

@@ -6,8 +6,8 @@
 #include "oracle/checks/conform.hpp"
 #include "oracle/files/fixture_file.hpp"
 #include "oracle/files/hdf5_io.hpp"
+#include "oracle/files/temporary_folder.hpp"
 #include "tests/small_fixture.hpp"
-#include "tests/temporary_folder.hpp"
 #include "tools/commands/check_results_file.hpp"
 
 #include <gtest/gtest.h>

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "oracle/files/fixture_file.hpp"
+#include "oracle/files/temporary_folder.hpp"
 #include "oracle/solution/digest.hpp"
 #include "oracle/solution/fixture.hpp"
 #include "reference/error.hpp"
@@ -11,7 +12,6 @@
 #include "reference/scene_file.hpp"
 #include "reference/shapes.hpp"
 #include "tests/file_bytes.hpp"
-#include "tests/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 
@@ -179,7 +179,7 @@ class FixtureFile : public testing::Test {
     }
   }
 
-  test::TemporaryFolder folder_;
+  TemporaryFolder folder_;
   const std::filesystem::path file_ = folder_ / "beaker-settled.h5";
 };
 

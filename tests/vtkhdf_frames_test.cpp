@@ -4,9 +4,9 @@
 
 #include "oracle/files/hdf5_handle.hpp"
 #include "oracle/files/hdf5_io.hpp"
+#include "oracle/files/temporary_folder.hpp"
 #include "tests/falling_points.hpp"
 #include "tests/file_bytes.hpp"
-#include "tests/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 
@@ -20,7 +20,6 @@ namespace decant {
 namespace {
 
 namespace fs = std::filesystem;
-using test::TemporaryFolder;
 
 constexpr std::int64_t particles = 7, frames = 4;
 

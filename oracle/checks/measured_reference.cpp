@@ -32,7 +32,7 @@ struct Copy {
 
 class CopyMaker {
  public:
-  explicit CopyMaker(unsigned seed) : random_(seed) {}
+  explicit CopyMaker(unsigned seed) : random_(seed), given_random_(seed) {}
 
   Copy operator()(const Scene& scene, const Walls& walls, const ParticleState& state, const StageInputs* given) {
     const Eigen::Index n = state.size();
@@ -56,20 +56,22 @@ class CopyMaker {
     if (!given) return copy;
     copy.given.density = given->density(from);
     copy.given.pressure = given->pressure(from);
-    for (double& x : copy.given.density) x = moved(x);
-    for (double& x : copy.given.pressure) x = moved(x);
+    // By draws of their own: a copy is the same whether inputs are handed in or not.
+    for (double& x : copy.given.density) x = moved(x, given_random_);
+    for (double& x : copy.given.pressure) x = moved(x, given_random_);
     return copy;
   }
 
  private:
   /// An fp32 number, moved by half an ulp at most.
-  double moved(double x) {
+  double moved(double x) { return moved(x, random_); }
+  double moved(double x, std::mt19937& random) {
     const auto single = std::abs(static_cast<float>(x));
     const double ulp = static_cast<double>(std::nextafter(single, std::numeric_limits<float>::infinity())) - single;
-    return x + 0.5 * ulp * side_(random_);
+    return x + 0.5 * ulp * side_(random);
   }
 
-  std::mt19937 random_;
+  std::mt19937 random_, given_random_;
   std::uniform_real_distribution<double> side_{-1, 1};
 };
 
@@ -91,67 +93,59 @@ void each_real_field(const Visit& visit) {
   for (const AccelerationField& field : acceleration_fields) visit(field.name, field.member);
 }
 
+/// What a reference says of one problem.
+struct Answer {
+  Fields own, given;    // given: from inputs that are handed in
+  ParticleState after;  // one substep on
+};
+
+/// What is asked beside the fields.
+struct Asked {
+  bool given = false, substep = false;
+};
+
+/// What it says of a state, and how far that moves at most.
+struct Measured {
+  Answer plain, spread;
+  StageInputs inputs;
+};
+
+std::vector<std::vector<SubstepOutcome>> outcomes_of(const ParticleState& after, const Eigen::Matrix3Xd& position,
+                                                     const Eigen::Matrix3Xd& velocity) {
+  std::vector<std::vector<SubstepOutcome>> outcomes;
+  for (Eigen::Index i = 0; i < after.size(); ++i)
+    outcomes.push_back({{after.position.col(i), after.velocity.col(i), position.col(i), velocity.col(i)}});
+  return outcomes;
+}
+
 class Measuring {
  public:
   explicit Measuring(Backend& reference) : reference_(reference), answered_(answered_by(reference.offers())) {}
 
-  ReferenceSolution solution(const Scene& scene, const Walls& walls, const ParticleState& state,
-                             const StageInputs* given = nullptr) {
-    ReferenceSolution found;
-    found.fields = fields(scene, walls, state, given);
-    Fields spread = Fields::unwritten(state.size(), walls.size());
-    each_real_field([&](const char*, auto member) { (spread.*member).setZero(); });
-    // Who is too near to H to be counted is a matter of geometry, whatever the formulas.
-    ReferenceSolution geometry = reference_solution(scene, walls, state);
-    found.fluid_ambiguous = std::move(geometry.fluid_ambiguous);
-    found.wall_ambiguous = std::move(geometry.wall_ambiguous);
-    found.most_fluid_ambiguous = geometry.most_fluid_ambiguous;
-    found.most_wall_ambiguous = geometry.most_wall_ambiguous;
+  /// One load per copy, and all that is asked of it.
+  Measured measured(const Scene& scene, const Walls& walls, const ParticleState& state, Asked asked = {}) {
+    Measured found;
+    found.plain.own = loaded(scene, walls, state);
+    found.inputs = stage_inputs(scene, found.plain.own, Staged::offset);
+    answer(found.plain, found.inputs, walls.size(), state.size(), asked);
+    found.spread = {zeros(state.size(), walls.size()), zeros(state.size(), walls.size()), found.plain.after};
+    found.spread.after.position.setZero();
+    found.spread.after.velocity.setZero();
+    const auto images = outcomes_of(found.plain.after, found.spread.after.position, found.spread.after.velocity);
     CopyMaker copies(seed);
     for (int k = 0; k < measured_copies; ++k) {
-      const Copy copy = copies(scene, walls, state, given);
-      const Fields other = fields(copy.scene, copy.walls, copy.state, given ? &copy.given : nullptr);
-      each_real_field([&](const char*, auto member) {
-        const bool in_place = member_is_of_walls(member);
-        widen(spread.*member, found.fields.*member, in_place ? other.*member : ordered(other.*member, copy.of));
-      });
+      const Copy copy = copies(scene, walls, state, &found.inputs);
+      Answer other{loaded(copy.scene, copy.walls, copy.state), {}, {}};
+      answer(other, copy.given, walls.size(), state.size(), asked);
+      widen(found.spread.own, found.plain.own, other.own, copy.of);
+      if (asked.given) widen(found.spread.given, found.plain.given, other.given, copy.of);
+      if (!asked.substep) continue;
+      other.after.position = ordered(other.after.position, copy.of);
+      other.after.velocity = ordered(other.after.velocity, copy.of);
+      other.after = nearest_images(std::move(other.after), scene, images);
+      widen(found.spread.after.position, found.plain.after.position, other.after.position);
+      widen(found.spread.after.velocity, found.plain.after.velocity, other.after.velocity);
     }
-    found.tolerance = Fields::unwritten(state.size(), walls.size());
-    each_real_field([&](const char*, auto member) {
-      found.tolerance.*member = tolerance_of(found.fields.*member, spread.*member);
-    });
-    return found;
-  }
-
-  SubstepSolution substep(const Fixture& fixture, const Walls& walls) {
-    const Scene& scene = fixture.scene;
-    const auto after = [&](const Scene& where, const Walls& around, const ParticleState& state) {
-      reference_.load(where, around, state);
-      return advanced(1, state.size());
-    };
-    const ParticleState plain = after(scene, walls, fixture.state);
-    Eigen::Matrix3Xd position = Eigen::Matrix3Xd::Zero(3, plain.size()), velocity = position;
-    CopyMaker copies(seed);
-    for (int k = 0; k < measured_copies; ++k) {
-      const Copy copy = copies(scene, walls, fixture.state, nullptr);
-      ParticleState other = after(copy.scene, copy.walls, copy.state);
-      for (Eigen::Index i = 0; i < plain.size(); ++i)
-        for (int c = 0; c < 3; ++c) {
-          if (!scene.domain.periodic[static_cast<std::size_t>(c)]) continue;
-          double& x = other.position(c, copy.of[static_cast<std::size_t>(i)]);
-          const double period = scene.domain.max[c] - scene.domain.min[c];
-          x -= period * std::round((x - plain.position(c, i)) / period);
-        }
-      widen(position, plain.position, ordered(other.position, copy.of));
-      widen(velocity, plain.velocity, ordered(other.velocity, copy.of));
-    }
-    position = tolerance_of(plain.position, position);
-    velocity = tolerance_of(plain.velocity, velocity);
-    SubstepSolution found;
-    found.ambiguous.assign(static_cast<std::size_t>(plain.size()), false);
-    for (Eigen::Index i = 0; i < plain.size(); ++i)
-      found.outcomes.push_back(
-          {SubstepOutcome{plain.position.col(i), plain.velocity.col(i), position.col(i), velocity.col(i)}});
     return found;
   }
 
@@ -170,8 +164,14 @@ class Measuring {
  private:
   static constexpr unsigned seed = 1;
 
-  static bool member_is_of_walls(Eigen::VectorXd Fields::* member) { return member == &Fields::boundary_volume; }
-  static bool member_is_of_walls(Eigen::Matrix3Xd Fields::*) { return false; }
+  static Fields zeros(Eigen::Index fluid, Eigen::Index wall) {
+    Fields all = Fields::unwritten(fluid, wall);
+    each_real_field([&](const char*, auto member) { (all.*member).setZero(); });
+    return all;
+  }
+
+  static bool is_of_walls(Eigen::VectorXd Fields::* member) { return member == &Fields::boundary_volume; }
+  static bool is_of_walls(Eigen::Matrix3Xd Fields::*) { return false; }
 
   template <class Matrix>
   static Matrix ordered(const Matrix& values, const Order& of) {
@@ -182,10 +182,25 @@ class Measuring {
   static void widen(Matrix& spread, const Matrix& values, const Matrix& other) {
     spread = spread.cwiseMax((other - values).cwiseAbs());
   }
+  static void widen(Fields& spread, const Fields& values, const Fields& other, const Order& of) {
+    each_real_field([&](const char*, auto member) {
+      widen(spread.*member, values.*member, is_of_walls(member) ? other.*member : ordered(other.*member, of));
+    });
+  }
 
-  Fields fields(const Scene& scene, const Walls& walls, const ParticleState& state, const StageInputs* given) {
+  Fields loaded(const Scene& scene, const Walls& walls, const ParticleState& state) {
     reference_.load(scene, walls, state);
-    Fields found = Fields::unwritten(state.size(), walls.size());
+    return fields(state.size(), walls.size(), nullptr);
+  }
+
+  /// The rest of an answer, at what is loaded.
+  void answer(Answer& out, const StageInputs& inputs, Eigen::Index wall, Eigen::Index fluid, Asked asked) {
+    if (asked.given) out.given = fields(fluid, wall, &inputs);
+    if (asked.substep) out.after = advanced(1, fluid);
+  }
+
+  Fields fields(Eigen::Index fluid, Eigen::Index wall, const StageInputs* given) {
+    Fields found = Fields::unwritten(fluid, wall);
     require(reference_.evaluate(found, given));
     each_real_field([&](const char* name, auto member) {
       // What comes before a stage that was handed in need not be computed.
@@ -213,6 +228,20 @@ class Measuring {
   Answered answered_;
 };
 
+/// Fields with their bounds, as reference_solution() has them.
+ReferenceSolution bounded(const ReferenceSolution& geometry, const Fields& values, const Fields& spread) {
+  ReferenceSolution found;
+  found.fields = found.tolerance = values;
+  each_real_field(
+      [&](const char*, auto member) { found.tolerance.*member = tolerance_of(values.*member, spread.*member); });
+  // Who is too near to H to be counted is a matter of geometry, whatever the formulas.
+  found.fluid_ambiguous = geometry.fluid_ambiguous;
+  found.wall_ambiguous = geometry.wall_ambiguous;
+  found.most_fluid_ambiguous = geometry.most_fluid_ambiguous;
+  found.most_wall_ambiguous = geometry.most_wall_ambiguous;
+  return found;
+}
+
 }  // namespace
 
 const CheckSelection& measured_checks() {
@@ -233,18 +262,28 @@ PreparedReference measured_reference(Backend& reference, const Fixture& fixture,
   if (prepared.walls.size() > 0 && !(prepared.offers & Offer::walls))
     throw BackendError("the reference " + reference.info().name + " does not offer walls");
   Measuring measuring(reference);
-  prepared.own = measuring.solution(scene, prepared.walls, fixture.state);
-  prepared.inputs = stage_inputs(scene, prepared.own.fields, Staged::offset);
-  if (wanted({"fields", "conservation"}) && (prepared.offers & Offer::given))
-    prepared.given = measuring.solution(scene, prepared.walls, fixture.state, &prepared.inputs);
+  const Asked asked{wanted({"fields", "conservation"}) && (prepared.offers & Offer::given),
+                    wanted({"substep"}) && (prepared.offers & Offer::step)};
+  const Measured found = measuring.measured(scene, prepared.walls, fixture.state, asked);
+  const ReferenceSolution geometry = reference_solution(scene, prepared.walls, fixture.state);
+  prepared.own = bounded(geometry, found.plain.own, found.spread.own);
+  prepared.inputs = found.inputs;
+  if (asked.given) prepared.given = bounded(geometry, found.plain.given, found.spread.given);
+  if (asked.substep) {
+    const ParticleState& after = found.plain.after;
+    prepared.substep.ambiguous.assign(static_cast<std::size_t>(after.size()), false);
+    prepared.substep.outcomes = outcomes_of(after, tolerance_of(after.position, found.spread.after.position),
+                                            tolerance_of(after.velocity, found.spread.after.velocity));
+  }
   if (wanted({"invariance"}))
     for (TransformedProblem& problem : transformed_problems(scene, fixture.state)) {
       Walls walls = sample_walls(problem.scene);
-      ReferenceSolution solution = measuring.solution(problem.scene, walls, problem.state);
+      const Measured changed = measuring.measured(problem.scene, walls, problem.state);
+      ReferenceSolution solution =
+          bounded(reference_solution(problem.scene, walls, problem.state), changed.plain.own, changed.spread.own);
       prepared.transformed.push_back({std::move(problem), std::move(walls), std::move(solution)});
     }
   if (!(prepared.offers & Offer::step)) return prepared;
-  if (wanted({"substep"})) prepared.substep = measuring.substep(fixture, prepared.walls);
   if (wanted({"mass", "containment", "determinism"})) {
     prepared.segments = segments_of(fixture, sample_every);
     for (Segment& segment : prepared.segments) segment.viewed = false;

@@ -3,6 +3,7 @@
 #include "oracle/files/foreign_file.hpp"
 
 #include "oracle/files/hdf5_checked.hpp"
+#include "oracle/files/temporary_folder.hpp"
 #include "reference/error.hpp"
 
 #include <fmt/format.h>
@@ -15,7 +16,6 @@
 #include <cerrno>
 #include <chrono>
 #include <csignal>
-#include <cstdlib>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -28,26 +28,6 @@ constexpr int deepest = 3;  // STATE/fields/NAME
 
 /// What the process says in the end: as it is, rewritten, or refused with key, value and bound.
 enum class Said : char { as_it_is = '=', rewritten = '>', refused = '!' };
-
-/// A folder of its own for the copy; both go with it.
-class CopyFolder {
- public:
-  CopyFolder() {
-    std::string name = std::filesystem::temp_directory_path() / "decant-XXXXXX";
-    if (!mkdtemp(name.data())) throw std::runtime_error(name + ": cannot be made");
-    path_ = name;
-  }
-  CopyFolder(const CopyFolder&) = delete;
-  CopyFolder& operator=(const CopyFolder&) = delete;
-  ~CopyFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  std::filesystem::path copy() const { return path_ / "copy.h5"; }
-
- private:
-  std::filesystem::path path_;
-};
 
 /// A numeric type, in this machine's byte order.
 Handle number_type(hid_t type) {
@@ -197,7 +177,8 @@ Hdf5Reader open_foreign(const std::filesystem::path& file, std::chrono::millisec
   std::error_code ignored;
   // What is no file at all is told by the reader.
   if (!std::filesystem::is_regular_file(file, ignored)) return Hdf5Reader(file);
-  const CopyFolder folder;
+  const TemporaryFolder folder;
+  const std::filesystem::path copy = folder / "copy.h5";
   std::array<int, 2> ends{};
   if (pipe(ends.data()) != 0) throw std::runtime_error("no pipe for a process that reads " + file.string());
   const pid_t child = fork();
@@ -206,7 +187,7 @@ Hdf5Reader open_foreign(const std::filesystem::path& file, std::chrono::millisec
     // Nothing of the parent's may run on here: neither its handlers nor what it would do at exit.
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     for (const int signal : {SIGINT, SIGTERM, SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL}) std::signal(signal, SIG_DFL);
-    const std::string said = rewritten(file, folder.copy());
+    const std::string said = rewritten(file, copy);
     const bool told = write(ends[1], said.data(), said.size()) == static_cast<ssize_t>(said.size());
     _exit(told ? 0 : 1);
   }
@@ -215,7 +196,7 @@ Hdf5Reader open_foreign(const std::filesystem::path& file, std::chrono::millisec
   close(ends[0]);
   const auto kind = said.empty() ? Said::refused : static_cast<Said>(said.front());
   if (kind == Said::rewritten && WIFEXITED(status) && WEXITSTATUS(status) == 0)
-    return Hdf5Reader(folder.copy(), Hdf5Reader::Format::checksums, file);
+    return Hdf5Reader(copy, Hdf5Reader::Format::checksums, file);
   if (kind == Said::as_it_is) return Hdf5Reader(file);
   if (said.empty()) {
     const bool late = WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL;

@@ -1,5 +1,5 @@
 /// \file
-/// Where tests write.
+/// A folder for what is not to stay.
 #pragma once
 
 #include <stdlib.h>
@@ -8,9 +8,10 @@
 #include <string>
 #include <system_error>
 
-namespace decant::test {
+namespace decant {
 
-/// Folder that is gone when the test is.
+/// Made under the system's folder for temporary files, under a name of its own; goes with its object and all in it.
+/// Throws std::runtime_error where it cannot be made.
 class TemporaryFolder {
  public:
   TemporaryFolder() {
@@ -31,4 +32,4 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-}  // namespace decant::test
+}  // namespace decant
