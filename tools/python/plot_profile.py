@@ -8,13 +8,11 @@ strategy, speed-up of the sums alone, sectors and their excess, a roofline, and 
 import argparse
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 
+from figures import plt, save
 from one_line import open_hdf5, run_main
+from study_runs import columns_of, provenance_of
 
 # Of an H200: fp32 TFLOP/s and DRAM TB/s that NVIDIA states.
 PEAK_FLOPS, PEAK_BYTES = 67e12, 4.8e12
@@ -40,10 +38,7 @@ class Profile:
 
     def __init__(self, path):
         with open_hdf5(path, ["decant_profile"], "a profile of profile_pour.py") as file:
-            self.columns = {name: item[:] for name, item in file.items() if name != "provenance"}
-            self.about = {name: value.decode() for name, value in file["provenance"].attrs.items()}
-        for name in ("backend", "kernel"):
-            self.columns[name] = np.char.decode(self.columns[name], "utf-8")
+            self.columns, self.about = columns_of(file), provenance_of(file)
         self.columns["stage"] = np.array([stage_of(kernel) for kernel in self.columns["kernel"]])
         self.backends = [b for b in NAMES if b in self.columns["backend"]]
 
@@ -60,13 +55,6 @@ class Profile:
     def common_frame(self):
         """The last frame that all backends have."""
         return max(set.intersection(*(set(self.frames(b)) for b in self.backends)))
-
-
-def save(figure, folder, name):
-    for axes in figure.axes:
-        axes.spines[["top", "right"]].set_visible(False)
-    figure.savefig(folder / f"{name}.png", dpi=90)
-    plt.close(figure)
 
 
 def over_frames(profile, folder):

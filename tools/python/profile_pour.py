@@ -10,16 +10,15 @@ plot_profile.py. Exit status: 0 all is there, 3 something is missing (--seconds 
 
 import argparse
 import json
-import os
 import re
 import subprocess
 import time
 from pathlib import Path
 
-import h5py
 import numpy as np
 
 from one_line import read_text, refuse, run_main
+from study_runs import about, keep, last_line, plain, run, write_table
 
 # The published study's ladder of hashes, then ours; lists rebuilt every substep, every ten, before a pair is missed.
 BACKENDS = ["brute", "hash:wall_cells=off:sort=thrust:force_neighbors=recomputed",
@@ -41,13 +40,6 @@ def schedule_of(scene):
         refuse(f"{scene}: no scene with time.end and time.frames: {error}")
 
 
-def run(command):
-    done = subprocess.run(command, capture_output=True, text=True)
-    if done.returncode:
-        refuse(f"{' '.join(map(str, command[:3]))} …: {(done.stderr or done.stdout).strip().splitlines()[-1:]}")
-    return done.stdout
-
-
 def record_states(arguments, folder):
     """The states' frames and files; recorded where one is missing."""
     end, frames = schedule_of(arguments.scene)
@@ -66,29 +58,15 @@ def coarse_to_fine(items):
     return [items[k] for k in sorted(range(len(items)), key=lambda k: f"{k:0{width}b}"[::-1])]
 
 
-def plain(name):
-    return re.sub(r"[^A-Za-z0-9.=_-]", "-", name)
-
-
 def gather(folder, done, provenance):
     """One row per state, backend and kernel."""
     rows = [(frame, backend, kernel) for frame, backend, file in done
             for kernel in json.loads(file.read_text())[0]["kernels"]]
     names = sorted({key for _, _, kernel in rows for key in kernel} - {"kernel"})
-    aside = folder / f".profile.{os.getpid()}"
-    with h5py.File(aside, "w", libver="v108") as out:
-        out.attrs["decant_profile"] = np.int64(1)
-        about = out.create_group("provenance")
-        for key, value in provenance.items():
-            about.attrs[key] = np.bytes_(value)
-        out["frame"] = np.array([frame for frame, *_ in rows], np.int64)
-        for name, values in (("backend", [b for _, b, _ in rows]), ("kernel", [k["kernel"] for *_, k in rows])):
-            out[name] = np.array([v.encode() for v in values])
-        for name in names:
-            values = np.array([kernel.get(name, np.nan) for *_, kernel in rows])
-            out.create_dataset(name, data=values, compression="gzip", shuffle=True)
-            out[name].attrs["unit"] = np.bytes_(UNITS.get(name, "1"))
-    aside.replace(folder / "profile.h5")
+    columns = {"frame": [frame for frame, *_ in rows], "backend": [backend for _, backend, _ in rows],
+               "kernel": [kernel["kernel"] for *_, kernel in rows]}
+    columns |= {name: [kernel.get(name, np.nan) for *_, kernel in rows] for name in names}
+    write_table(folder / "profile.h5", "decant_profile", columns, UNITS, provenance)
 
 
 def main():
@@ -104,10 +82,7 @@ def main():
         refuse("--states: 2 at least")
     start = time.monotonic()
     (arguments.folder / "runs").mkdir(parents=True, exist_ok=True)
-    info = json.loads(run([arguments.decant, "info", "--json"]))
-    device = next((e["device"] for e in info["executors"] if e["name"] == "cuda" and e["available"]), None)
-    if device is None:
-        refuse("no CUDA device here, and kernels of a host have no counters")
+    build = about(arguments.decant, "cuda")  # kernels of a host have no counters
     files = record_states(arguments, arguments.folder)
     backends = arguments.backend or BACKENDS
     done, missing = [], 0
@@ -119,18 +94,16 @@ def main():
                 told = subprocess.run([arguments.decant, "bench", state, "--backend", backend, "--executor", "cuda",
                                        "--profile", "--json"], capture_output=True, text=True)
                 if told.returncode == 0:
-                    aside = file.with_suffix(".part")
-                    aside.write_text(told.stdout)
-                    aside.replace(file)
+                    keep(file, told.stdout)
                 else:
-                    print(f"frame {frame}, {backend}: {told.stderr.strip().splitlines()[-1:]}", flush=True)
+                    print(f"frame {frame}, {backend}: {last_line(told.stderr)}", flush=True)
             if file.is_file():
                 done.append((frame, backend, file))
             else:
                 missing += 1
     if done:
-        gather(arguments.folder, sorted(done, key=lambda one: one[0]), {"scene": arguments.scene.name, "device": device,
-                                        "git_revision": info["git_revision"]})
+        gather(arguments.folder, sorted(done, key=lambda one: one[0]), {
+            "scene": arguments.scene.name, "device": build["device"], "git_revision": build["git_revision"]})
     total = len(files) * len(backends)
     print(f"{len(done)} of {total} profiles in {arguments.folder / 'profile.h5'}, {time.monotonic() - start:.0f} s"
           + (f"; {missing} are missing, the same command goes on" if missing else ""))
