@@ -47,6 +47,9 @@ void add_drift_command(CLI::App& app, int& exit_status);
 /// met.
 void add_validate_command(CLI::App& app, int& exit_status);
 
+/// `decant live`: runs a scene that is looked at and changed in a browser. Ends with 130 or 143, by a signal.
+void add_live_command(CLI::App& app, int& exit_status);
+
 /// `decant record`: runs the oracle and writes a fixture.
 void add_record_command(CLI::App& app, int& exit_status);
 

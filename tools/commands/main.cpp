@@ -23,6 +23,7 @@ namespace {
 constexpr const char* footer =
     "Examples:\n"
     "  decant pour fixtures/scenes/pour-4k.json --out build/pour-4k\n"
+    "  decant live fixtures/scenes/pour-4k.json\n"
     "  decant conform --backend brute --report build/report.h5\n"
     "  decant diff before.h5 build/report.h5\n"
     "  decant record fixtures/scenes/pour-4k.json --out pour-4k-stream.h5\n"
@@ -57,6 +58,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer(footer);
   add_pour_command(app, status);
+  add_live_command(app, status);
   add_record_command(app, status);
   add_conform_command(app, status);
   add_export_command(app, status);

@@ -1,0 +1,56 @@
+/// \file
+/// Scales that do not move from picture to picture, so that colors can be compared.
+#include "tools/live/colors.hpp"
+
+#include "reference/scene_checks.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace decant::live {
+
+Colors scale_of(Quantity quantity, const Scene& scene) {
+  const double density = scene.fluid.rest_density, speed = std::max(expected_max_speed(scene), 1e-9);
+  switch (quantity) {
+    case Quantity::density:
+      return {quantity, {}, 0.95 * density, 1.05 * density};
+    case Quantity::pressure:
+      return {quantity, {}, 0, 0.5 * density * speed * speed};
+    case Quantity::region:
+      return {quantity, {}, 0, static_cast<double>(region_names.size() - 1)};
+    case Quantity::speed:
+      return {quantity, {}, 0, speed};
+    case Quantity::score:
+      break;
+  }
+  return {quantity, {}, 0, 1};
+}
+
+void color(Colors& colors, const ParticleState& state, const AuditResult& audit, const Scores* scores) {
+  switch (colors.quantity) {
+    case Quantity::speed:
+      colors.values = state.velocity.colwise().norm().transpose();
+      break;
+    case Quantity::region:
+      colors.values = Eigen::Map<const Eigen::Matrix<std::uint8_t, Eigen::Dynamic, 1>>(
+                          audit.region.data(), static_cast<Eigen::Index>(audit.region.size()))
+                          .cast<double>();
+      break;
+    case Quantity::score:
+      if (scores && scores->values.size() == state.size()) {
+        colors.values = scores->values;
+        // An infinite score stands at the end of any scale.
+        colors.largest = std::isfinite(scores->largest) ? std::max(1.0, scores->largest) : 10.0;
+      }
+      break;
+    case Quantity::density:
+    case Quantity::pressure:
+      break;
+  }
+  // After a failure there are no fields.
+  if (colors.values.size() != state.size())
+    colors.values.setConstant(state.size(), std::numeric_limits<double>::quiet_NaN());
+}
+
+}  // namespace decant::live
