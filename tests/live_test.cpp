@@ -101,7 +101,7 @@ TEST(LivePicture, SaysWherePosesAndParticlesAre) {
   state.velocity.setZero();
   state.velocity(2, 3) = -0.5 * colors.largest;
   state.velocity(0, 4) = 2 * colors.largest;
-  color(colors, state, {}, nullptr);
+  color(colors, state, {});
   colors.values[5] = std::nan("");
   const Message bytes = picture_of(scene, state, colors);
   const std::size_t head = 14 + 12 * scene.containers.size(), n = static_cast<std::size_t>(state.size());

@@ -27,18 +27,19 @@ Colors scale_of(Quantity quantity, const Scene& scene) {
   return {quantity, {}, 0, 1};
 }
 
-void color(Colors& colors, const ParticleState& state, const AuditResult& audit, const Scores* scores) {
+void color(Colors& colors, const ParticleState& state, const Results& results) {
   switch (colors.quantity) {
     case Quantity::speed:
       colors.values = state.velocity.colwise().norm().transpose();
       break;
     case Quantity::region:
-      colors.values = Eigen::Map<const Eigen::Matrix<std::uint8_t, Eigen::Dynamic, 1>>(
-                          audit.region.data(), static_cast<Eigen::Index>(audit.region.size()))
-                          .cast<double>();
+      if (const auto& audit = results.audit)
+        colors.values = Eigen::Map<const Eigen::Matrix<std::uint8_t, Eigen::Dynamic, 1>>(
+                            audit->region.data(), static_cast<Eigen::Index>(audit->region.size()))
+                            .cast<double>();
       break;
     case Quantity::score:
-      if (scores && scores->values.size() == state.size()) {
+      if (const auto& scores = results.scores; scores && scores->values.size() == state.size()) {
         colors.values = scores->values;
         // An infinite score stands at the end of any scale.
         colors.largest = std::isfinite(scores->largest) ? std::max(1.0, scores->largest) : 10.0;

@@ -6,14 +6,21 @@
 #include "tools/live/picture.hpp"
 #include "tools/live/scores.hpp"
 
+#include <memory>
+
 namespace decant::live {
 
 /// The scale that fits the scene: speed up to the one that its time step was derived for, v; density ρ0 ± 5 %; pressure
 /// up to ρ0 v²/2; region and score: see color.
 Colors scale_of(Quantity quantity, const Scene& scene);
 
-/// Fills in the values; those of density and pressure are there. \param audit  filled where the quantity is a region;
-/// \param scores  null: none yet. Their scale goes from 0 to 1, or to the largest.
-void color(Colors& colors, const ParticleState& state, const AuditResult& audit, const Scores* scores);
+/// What was found out beside the loop, of an instant a little earlier; null: nothing yet.
+struct Results {
+  std::shared_ptr<const AuditResult> audit;
+  std::shared_ptr<const Scores> scores;
+};
+
+/// Fills in the values; those of density and pressure are there. The scale of scores goes from 0 to 1, or to the largest.
+void color(Colors& colors, const ParticleState& state, const Results& results);
 
 }  // namespace decant::live

@@ -18,6 +18,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
@@ -32,8 +33,8 @@ namespace {
 using nlohmann::ordered_json;
 using SharedState = std::shared_ptr<const ParticleState>;
 
-// Of the time, what pictures may take; but five a second there are in any case.
-constexpr double share_of_pictures = 0.07, slowest_interval = 0.2;
+// Of the time, what pictures may take; but more than five a second there are where they can be made.
+constexpr double share_of_pictures = 0.07, slowest_interval = 0.15;
 // s, between two figures of the status.
 constexpr double status_interval = 0.25;
 
@@ -120,7 +121,12 @@ class Run::Implementation {
   void advance(std::int64_t n);
   void show();
   void score(const SharedState& state);
+  void audit(const SharedState& state);
   LoopStatus loop_status();
+  Results results() {
+    const std::lock_guard lock(mutex_);
+    return results_;
+  }
   void set_pace() {
     paced_from_ = Clock::now();
     paced_substep_ = substep_;
@@ -152,12 +158,13 @@ class Run::Implementation {
 
   std::mutex mutex_;
   std::condition_variable wake_;
-  std::deque<std::string> asked_;              // by mutex_
-  std::shared_ptr<const Scores> scores_;       // by mutex_
-  std::shared_ptr<const Scene> audited_;       // view_'s
-  std::optional<Audit> audit_;                 // view_'s
-  std::optional<WallSolution> wall_solution_;  // scoring_'s; of the present walls
-  Background view_, scoring_, keeping_;        // last: they use the above
+  std::deque<std::string> asked_;                // by mutex_
+  Results results_;                              // by mutex_
+  std::atomic<double> audit_cost_ = 0;           // s
+  std::shared_ptr<const Scene> audited_;         // audit_'s
+  std::optional<Audit> sampler_;                 // audit_'s
+  std::optional<WallSolution> wall_solution_;    // scoring_'s; of the present walls
+  Background view_, audit_, scoring_, keeping_;  // last: they use the above
 };
 
 void Run::Implementation::answer() {
@@ -234,11 +241,12 @@ void Run::Implementation::start() {
   Walls walls = sample_walls(scene_.running());
   ParticleState first = initial_state(scene_.running());
   scoring_.wait();
+  audit_.wait();
   walls_ = std::move(walls);
   wall_solution_.reset();
   {
     const std::lock_guard lock(mutex_);
-    scores_.reset();
+    results_ = {};
   }
   rate_ = 0;
   load(std::move(first));
@@ -347,7 +355,7 @@ LoopStatus Run::Implementation::loop_status() {
   return loop;
 }
 
-/// Where `view_` is idle.
+/// Where `view_` is idle; where the figures are due, those too.
 void Run::Implementation::show() {
   if (!view_.idle()) return;
   const auto before = Clock::now();
@@ -367,29 +375,36 @@ void Run::Implementation::show() {
   } catch (const BackendError& error) {
     return fail(error.what());
   }
-  const bool with_status = seconds_since(told_) >= status_interval || paused_ || !failed_.empty();
-  const std::optional<LoopStatus> loop = with_status ? std::optional(loop_status()) : std::nullopt;
-  view_.start([this, state = last_, scene = running_, colors, loop] {
-    std::shared_ptr<const Scores> scores;
-    {
-      const std::lock_guard lock(mutex_);
-      scores = scores_;
-    }
-    AuditResult audit;
-    if (loop || colors->quantity == Quantity::region) {
-      // A scene that changed has other walls to pass: paths are followed from there.
-      if (audited_ != scene) audit_.emplace(*scene);
-      audited_ = scene;
-      audit = audit_->sample(*state);
-    }
-    color(*colors, *state, audit, scores.get());
+  view_.start([this, state = last_, scene = running_, colors, results = results()] {
+    color(*colors, *state, results);
     viewer_.picture(picture_of(*scene, *state, *colors));
-    if (loop) viewer_.tell(status_message(*scene, *loop, state->substep, audit));
   });
   // The threads of a solver on the host are as many as there are cores, and share a substep evenly: what delays one
   // delays all.
-  if (backend_->info().executor != "cuda") view_.wait();
+  const bool on_host = backend_->info().executor != "cuda";
+  if (on_host) view_.wait();
   follow(picture_cost_, seconds_since(before));
+  const bool at_rest = paused_ || !failed_.empty();
+  if (audit_.idle() &&
+      (at_rest || seconds_since(told_) >= std::max(status_interval, audit_cost_ / share_of_pictures))) {
+    audit(last_);
+    if (on_host) audit_.wait();
+  }
+}
+
+/// Where the water is, and the status. Of a million particles it takes longer than a picture.
+void Run::Implementation::audit(const SharedState& state) {
+  audit_.start([this, state, scene = running_, loop = loop_status()] {
+    const auto start = Clock::now();
+    // A scene that changed has other walls to pass: paths are followed from there.
+    if (audited_ != scene) sampler_.emplace(*scene);
+    audited_ = scene;
+    auto result = std::make_shared<const AuditResult>(sampler_->sample(*state));
+    viewer_.tell(status_message(*scene, loop, state->substep, *result));
+    audit_cost_ = seconds_since(start);
+    const std::lock_guard lock(mutex_);
+    results_.audit = std::move(result);
+  });
 }
 
 void Run::Implementation::score(const SharedState& state) {
@@ -401,7 +416,7 @@ void Run::Implementation::score(const SharedState& state) {
       auto scores = std::make_shared<const Scores>(scores_of(*scene, walls_, *wall_solution_, *state, *fields));
       viewer_.tell(scores_message(*scores));
       const std::lock_guard lock(mutex_);
-      scores_ = std::move(scores);
+      results_.scores = std::move(scores);
     } catch (const std::exception& error) {
       viewer_.tell({{"type", "error"}, {"text", fmt::format("no scores: {}", error.what())}});
     }

@@ -23,7 +23,7 @@ import h5py
 import numpy as np
 
 from one_line import refuse, run_main
-from study_runs import (ROOT, about, columns_of, last_line, name_of, plain, provenance_of, recording, run_for,
+from study_runs import (ROOT, about, columns_of, keep, last_line, name_of, plain, provenance_of, recording, run_for,
                         write_table)
 
 INTERVALS, SKINS = (1, 2, 5, 10, 20, 50, 100), (0, 0.1, 0.2)
@@ -140,8 +140,15 @@ def measure_times(sets, reports, arguments, left):
     known = timed(reports)
     for some in calls_for([name for name in sets if plain(name) not in known], max(len(sets), 1)):
         if left() > 0:
-            call(["bench", arguments.recording, "--backend", ",".join(some), "--windows", str(arguments.windows),
-                  "--json", "--report", reports.next(some)], arguments, left)
+            told = call(["bench", arguments.recording, "--backend", ",".join(some), "--windows", str(arguments.windows),
+                         "--json", "--report", reports.next(some)], arguments, left)
+            for name, why in re.findall(r"^(\S+) +breaks down, is not timed: (.*)$", told, flags=re.MULTILINE):
+                keep(broken(name, arguments), why)
+
+
+def broken(name, arguments):
+    """Where it is kept why a set has no time."""
+    return arguments.folder / "runs" / f"breaks-{arguments.executor}-{arguments.recording.stem}-{plain(name)}.txt"
 
 
 def measure_drift(reports, arguments, left):
@@ -159,6 +166,7 @@ def call(command, arguments, left):
         refuse(f"{command[0]}: {last_line(done.stderr)}")
     if done.returncode not in (0, 1):
         print(f"{command[0]}: exit status {done.returncode}: {last_line(done.stderr)}", flush=True)
+    return done.stderr
 
 
 def judge_rounded(file, arguments, left):
@@ -201,7 +209,7 @@ def gather(sets, judgements, times, drifts, rounded, arguments, provenance):
     """One row per option set that has all it needs; how many those are."""
     swept = {fixed_list(i, s) for s in arguments.skins for i in arguments.intervals}
     there = [name for name in sets if plain(name) in judgements and (plain(name) in drifts or name not in swept)
-             and (plain(name) in times or refused(judgements[plain(name)]))]
+             and (plain(name) in times or refused(judgements[plain(name)]) or broken(name, arguments).is_file())]
     if not there:
         return 0
     rows = [(*judgements[plain(name)], *times.get(plain(name), ({}, "")), drifts.get(plain(name), {}))
@@ -252,7 +260,8 @@ def main():
     drifts = Reports(f"drift-{arguments.window}", ".h5", arguments)
     judge(sets, conforms, arguments, left)
     judgements = judged(conforms)
-    unfit = [name for name in sets if plain(name) in judgements and refused(judgements[plain(name)])]
+    unfit = [name for name in sets if broken(name, arguments).is_file()
+             or plain(name) in judgements and refused(judgements[plain(name)])]
     measure_times([name for name in sets if name not in unfit], benches, arguments, left)
     measure_drift(drifts, arguments, left)
     rounded = judge_rounded(arguments.folder / "runs" / f"rounded-{arguments.executor}.txt", arguments, left)
