@@ -161,6 +161,7 @@ void Server::Implementation::Page::open_socket() {
   socket_.emplace(std::move(stream_));
   socket_->set_option(websocket::stream_base::timeout::suggested(beast::role_type::server));
   socket_->read_message_max(longest_ask);
+  socket_->auto_fragment(false);  // a picture is one frame, not thousands of 4 KB
   socket_->async_accept(parser_->get(), [self = shared_from_this()](const error_code& error) {
     if (error) return;
     self->server_.join(self);
