@@ -53,8 +53,9 @@ class Profile:
         return np.unique(self.columns["frame"][self.columns["backend"] == backend])
 
     def common_frame(self):
-        """The last frame that all backends have."""
-        return max(set.intersection(*(set(self.frames(b)) for b in self.backends)))
+        """The middle one of the frames that all backends have."""
+        common = sorted(set.intersection(*(set(self.frames(b)) for b in self.backends)))
+        return common[len(common) // 2]
 
 
 def over_frames(profile, folder):
@@ -91,7 +92,7 @@ def bars(profile, folder):
     right.bar(places, [sums["brute"] / sums[b] for b in profile.backends], color="#4c78a8")
     for place, b in zip(places, profile.backends):
         gain = sums["brute"] / sums[b]
-        right.text(place, gain, f"{gain:.2g}×", ha="center", va="bottom", fontsize=8)
+        right.text(place, gain, f"{gain:.0f}×" if gain >= 10 else f"{gain:.2g}×", ha="center", va="bottom", fontsize=8)
     right.set_yscale("log")
     right.set_ylabel("density + force: times faster than brute's")
     for axes in (left, right):
@@ -155,13 +156,14 @@ def table(profile):
         if counter == "occupancy_achieved":
             text += f" of {found['occupancy_theoretical'].max():.0f} % that registers allow"
         lines.append(f"| {what} | {theirs} | {text} |")
-    for backend in ("hash:launch=stream", "list:launch=stream", "brute"):
+    for backend in (LADDER, "hash:launch=stream", "list:launch=stream", "brute"):
         for stage in ("density", "force"):
             found = profile.of(backend, stage)
             a, lanes = found["occupancy_achieved"], found["active_lanes"]
             drop = "fall of 20 to 30 % while pouring, frames 100 to 410" if backend != "brute" else ""
             lines.append(f"| {NAMES[backend]}, {stage}: occupancy and lanes over the pour | {drop} | "
-                         f"{a.min():.1f} to {a.max():.1f} %, {lanes.min():.1f} to {lanes.max():.1f} of 32 |")
+                         f"{a.min():.1f} to {a.max():.1f} %, a fall of {100 * (1 - a.min() / a.max()):.0f} %; "
+                         f"{lanes.min():.1f} to {lanes.max():.1f} of 32 |")
     return "\n".join(lines)
 
 

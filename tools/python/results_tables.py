@@ -13,10 +13,12 @@ import sys
 from pathlib import Path
 
 import h5py
+import numpy as np
 
 from merge_fuzz import GROUPS
 from one_line import read_text, refuse, run_main
 from option_names import current
+from study_runs import columns_of, provenance_of
 
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS = ROOT / "fixtures" / "results"
@@ -282,7 +284,56 @@ def study():
                                                               profile.about["git_revision"])
 
 
+def study_columns(name):
+    """Columns of a table of the study, and its line of source; the device is that of its provenance."""
+    path = RESULTS / "h200" / "study" / f"{name}.h5"
+    with h5py.File(path) as file:
+        columns, about = columns_of(file), provenance_of(file)
+    return columns, about, source(path, device_of(about["device"]), about["git_revision"])
+
+
+def study_size():
+    c, _, where = study_columns("size")
+    shown = []
+    for n in sorted(set(c["particles"].tolist())):
+        row = [f"{n:,.0f}"]
+        for backend in ("brute", "hash", "list"):
+            (k,) = np.flatnonzero((c["particles"] == n) & (c["backend"] == backend)).tolist() or (None,)
+            if k is None or c["outcome"][k] != "timed":
+                row.append("")
+                continue
+            row.append(f"{1e3 * c['substep_us'][k] / n:.3g} ns, {c['device_bytes_per_particle'][k]:.0f} B")
+        shown.append(row)
+    return table(["particles", "`brute`", "`hash`", "`list`"], shown) + where
+
+
+def study_error():
+    c, about, where = study_columns("error")
+    order = np.argsort(np.where(np.isnan(c["substep_us"]), np.inf, c["substep_us"]), kind="stable")
+    shown = []
+    for k in order:
+        missed = c["drift_worst_missed_share"][k]
+        shown.append([f"`{c['option_set'][k]}`",
+                      "breaks down" if np.isnan(c["substep_us"][k]) else f"{c['substep_us'][k]:.3g} µs",
+                      f"{c['score'][k]:.3g}", "" if np.isnan(missed) else f"{100 * missed:.2g} %", c["verdict"][k]])
+    what = f"{about['recording']}, {int(about['particles']):,} particles."
+    return table(["options", "substep", "score", "pairs missed at worst", "verdict"], shown) + f"\n\n{what}" + where
+
+
+def live():
+    path = RESULTS / "h200" / "live.json"
+    told = json.loads(path.read_text(encoding="utf-8"))
+    shown = [[f"{row['particles']:,}", f"`{row['backend']}`", f"{row['pictures_per_second']:.1f}",
+              f"{row['substeps_per_second']:,.0f}", f"{row['slower_percent']:.0f} %",
+              f"{row['picture_bytes'] / 1e6:.1f} MB", f"{row['more_memory_MB']:.0f} MB"] for row in told["rows"]]
+    heads = ["particles", "backend", "pictures/s", "substeps/s unwatched", "slower watched", "a picture", "memory"]
+    return table(heads, shown) + source(path, device_of(told["rows"][0]["device"]), told["provenance"]["git_revision"])
+
+
 TABLES = {
+    "live": live,
+    "study-size": study_size,
+    "study-error": study_error,
     "study": study,
     "verdicts": verdicts,
     "substep-times": substep_times,
