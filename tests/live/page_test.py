@@ -19,6 +19,7 @@ import time
 import unittest
 from pathlib import Path
 
+import h5py
 import numpy as np
 import websocket
 from PIL import Image
@@ -36,9 +37,9 @@ DECANT = "build/release/bin/decant"
 class Live:
     """One `decant live` on the scene of two small cups, and what it says at first."""
 
-    def __init__(self, *options):
+    def __init__(self, *options, scene=HERE / "cups.json"):
         self.keep = Path(tempfile.mkdtemp(prefix="decant-live-"))
-        self.process = subprocess.Popen([DECANT, "live", HERE / "cups.json", "--backend", "hash", "--executor", "host",
+        self.process = subprocess.Popen([DECANT, "live", scene, "--backend", "hash", "--executor", "host",
                                          "--keep", self.keep, *options], stdout=subprocess.PIPE, text=True)
         self.address = self.process.stdout.readline().strip()
         self.hint = self.process.stdout.readline()
@@ -226,6 +227,25 @@ class PageTest(unittest.TestCase):
         (kept,) = self.live.keep.glob("*.h5")
         told = subprocess.run([DECANT, "conform", kept, "--backend", "hash", "--executor", "host"], capture_output=True)
         self.assertEqual(told.returncode, 0, told.stdout)
+
+    def test_a_kept_instant_is_where_another_run_starts(self):
+        self.until(lambda: self.js("live.picture.substep") > 200, "the run is under way")
+        self.find("keep").click()
+        self.until(lambda: "decant conform" in self.find("verdict").text, "the file", 120)
+        (kept,) = self.live.keep.glob("*.h5")
+        with h5py.File(kept) as file:
+            position = file["state/position"][:]
+        again = Live("--paused", scene=kept)
+        try:
+            self.browser.get(again.address)
+            self.until(lambda: self.js("live.drawn") > 0, "it is drawn")
+            self.assertEqual(self.js("live.picture.substep"), int(kept.stem.split("-")[-1]))
+            drawn = np.array(self.js("Array.from(live.picture.particles)")).reshape(-1, 4)[:, :3] / 65535
+            least, extent = (np.array(self.js(f"Array.from(live.picture.{one})")) for one in ("min", "extent"))
+            np.testing.assert_allclose(least + extent * drawn, position, atol=1e-5)
+        finally:
+            self.browser.get("about:blank")
+            again.end()
 
     def test_the_end_of_the_run_is_told(self):
         self.live.process.send_signal(signal.SIGINT)

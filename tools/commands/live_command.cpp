@@ -1,6 +1,8 @@
 /// \file
 /// `decant live`: options, where the page is, and until when.
+#include "oracle/files/fixture_file.hpp"
 #include "reference/error.hpp"
+#include "reference/scene_checks.hpp"
 #include "reference/scene_file.hpp"
 #include "tools/commands/backend_choice.hpp"
 #include "tools/commands/commands.hpp"
@@ -42,12 +44,27 @@ constexpr const char* live_footer =
     "\"judge this\" runs conform on it.\n"
     "\n"
     "Example:\n"
-    "  decant live fixtures/scenes/pour-4k.json --backend hash";
+    "  decant live fixtures/scenes/pour-4k.json --backend hash\n"
+    "  decant live fixtures/pour-56k-stream.h5";
 
-std::string text_of(const std::string& file) {
+/// Where a run starts.
+struct Start {
+  live::LiveScene scene;
+  std::optional<ParticleState> state;  // none: the scene's initial state
+};
+
+Start start_of(const std::string& file) {
+  if (file.ends_with(".h5")) {
+    Fixture fixture = read_fixture(file);
+    const int substeps = fixture.scene.schedule.substeps_per_frame;
+    // Where the rules of this build give another substep, the recording's number would mean another time.
+    if (fixture.scene.schedule.substeps_derived && substeps_for(fixture.scene) != substeps)
+      fixture.scene.schedule.substeps_derived = false;
+    return {live::LiveScene(scene_to_json(fixture.scene), file), std::move(fixture.state)};
+  }
   (void)load_scene(file);  // refuses what cannot be read, as other verbs do
   std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  return {live::LiveScene({std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()}, file), std::nullopt};
 }
 
 std::string host_name() {
@@ -60,9 +77,12 @@ int run(LiveArguments& arguments) {
     throw InputError("command line", "--pictures", fmt::format("{}", arguments.pictures),
                      "must be in 0 … 1000 per second");
   check_output_folder("--keep", arguments.keep);
-  live::LiveScene scene(text_of(arguments.scene), arguments.scene);
+  auto [scene, state] = start_of(arguments.scene);
+  if (arguments.particles && state)
+    throw InputError("command line", "--particles", std::to_string(*arguments.particles), "a scene, not a recording");
   if (arguments.particles) scene.set_particles(*arguments.particles);
   live::Options options;
+  options.start = std::move(state);
   options.backend = arguments.flags.applied_to(arguments.backend);
   arguments.flags.require_used();
   options.backends = backend_choices();
@@ -98,7 +118,7 @@ int run(LiveArguments& arguments) {
 void add_live_command(CLI::App& app, int& exit_status) {
   auto* command = app.add_subcommand("live", "run a scene, shown and changed in a browser");
   auto a = std::make_shared<LiveArguments>();
-  command->add_option("SCENE", a->scene, "Scene file (JSON)")->required();
+  command->add_option("SCENE", a->scene, "Scene file (JSON), or a recording (*.h5) to start from")->required();
   command->add_option("--backend", a->backend, "reference, brute, …, plugin:PATH, python:FILE:CLASS")
       ->capture_default_str();
   command->add_option("--executor", a->executor, "auto, cuda or host")->capture_default_str();

@@ -63,7 +63,11 @@ void follow(double& mean, double value) { mean = mean > 0 ? 0.8 * mean + 0.2 * v
 class Run::Implementation {
  public:
   Implementation(LiveScene scene, Options options, Viewer& viewer)
-      : options_(std::move(options)), viewer_(viewer), scene_(std::move(scene)), paused_(options_.paused) {}
+      : options_(std::move(options)),
+        viewer_(viewer),
+        scene_(std::move(scene)),
+        from_(options_.start),
+        paused_(options_.paused) {}
 
   void ask(std::string json) {
     const std::lock_guard lock(mutex_);
@@ -135,6 +139,7 @@ class Run::Implementation {
   const Options options_;
   Viewer& viewer_;
   LiveScene scene_;
+  std::optional<ParticleState> from_;     // where the run starts, while it has the recording's particles
   std::shared_ptr<const Scene> running_;  // a copy that others may hold
   Walls walls_;
   std::string choice_;
@@ -239,7 +244,7 @@ void Run::Implementation::answer(const ordered_json& ask) {
 
 void Run::Implementation::start() {
   Walls walls = sample_walls(scene_.running());
-  ParticleState first = initial_state(scene_.running());
+  ParticleState first = from_ ? *from_ : initial_state(scene_.running());
   scoring_.wait();
   audit_.wait();
   walls_ = std::move(walls);
@@ -255,10 +260,12 @@ void Run::Implementation::start() {
 
 /// From a scene that was changed. One that cannot start leaves all as it was.
 void Run::Implementation::start_anew(const LiveScene& before, const std::string& why) {
+  const auto from = std::exchange(from_, std::nullopt);
   try {
     start();
   } catch (const InputError&) {
     scene_ = before;
+    from_ = from;
     throw;
   }
   viewer_.tell({{"type", "note"}, {"text", why + "; the run starts anew"}});

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "oracle/backend.hpp"
+#include "reference/state.hpp"
 #include "tools/live/live_scene.hpp"
 #include "tools/live/picture.hpp"
 
@@ -12,6 +13,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 namespace decant::live {
@@ -37,9 +39,10 @@ struct Options {
   std::string backend;                // as on the command line
   std::vector<std::string> backends;  // that the page offers
   MakeBackend make_backend;
-  std::filesystem::path keep = ".";  // folder of what is kept
-  double pictures_per_second = 30;   // at most
-  double speed = 0;                  // s of the scene per s of clock, at most; 0: as fast as it goes
+  std::optional<ParticleState> start;  // of a recording; none: the scene's initial state
+  std::filesystem::path keep = ".";    // folder of what is kept
+  double pictures_per_second = 30;     // at most
+  double speed = 0;                    // s of the scene per s of clock, at most; 0: as fast as it goes
   bool paused = false;
 };
 

@@ -68,6 +68,7 @@ class Server::Implementation {
 
   void accept();
   void picture(Message bytes);
+  void drawn(Page& page);
   void tell(const std::string& type, Message text);
   void join(const std::shared_ptr<Page>& page);
   void leave(const std::shared_ptr<Page>& page);
@@ -98,7 +99,15 @@ class Server::Implementation::Page : public std::enable_shared_from_this<Page> {
 
   void read_request();
   void send(Message bytes, bool binary);
+  void close() { beast::get_lowest_layer(*socket_).close(); }
+  void send_picture(const Message& picture) {
+    drawn = false;
+    sent_ = picture;
+    send(picture, true);
+  }
   bool drawn = true;
+  /// Whether a later picture was made since.
+  bool behind(const Message& picture) const { return sent_ != picture; }
 
  private:
   void answer(const error_code& error);
@@ -112,6 +121,7 @@ class Server::Implementation::Page : public std::enable_shared_from_this<Page> {
   };
 
   Implementation& server_;
+  Message sent_;  // the last picture
   beast::tcp_stream stream_;
   beast::flat_buffer buffer_;
   std::optional<http::request_parser<http::empty_body>> parser_;
@@ -175,8 +185,7 @@ void Server::Implementation::Page::read_ask() {
     std::string ask = beast::buffers_to_string(self->buffer_.data());
     self->buffer_.consume(self->buffer_.size());
     if (ask == "drawn") {
-      self->drawn = true;
-      self->server_.count();
+      self->server_.drawn(*self);
     } else {
       self->server_.asked_(std::move(ask));
     }
@@ -186,7 +195,7 @@ void Server::Implementation::Page::read_ask() {
 
 void Server::Implementation::Page::send(Message bytes, bool binary) {
   // A page that takes nothing any more is closed, before it holds all memory.
-  if (outgoing_.size() >= longest_backlog) return beast::get_lowest_layer(*socket_).close();
+  if (outgoing_.size() >= longest_backlog) return close();
   outgoing_.push_back({std::move(bytes), binary});
   if (outgoing_.size() == 1) write();
 }
@@ -210,13 +219,10 @@ void Server::Implementation::accept() {
 }
 
 void Server::Implementation::join(const std::shared_ptr<Page>& page) {
-  if (pages_.size() >= most_pages) return;
+  if (pages_.size() >= most_pages) return page->close();
   pages_.insert(page);
   for (const auto& [type, text] : last_) page->send(text, false);
-  if (last_picture_) {
-    page->drawn = false;
-    page->send(last_picture_, true);
-  }
+  if (last_picture_) page->send_picture(last_picture_);
   count();
 }
 
@@ -234,11 +240,15 @@ void Server::Implementation::count() {
 
 void Server::Implementation::picture(Message bytes) {
   last_picture_ = bytes;
-  for (const auto& page : std::set(pages_)) {
-    if (!page->drawn) continue;
-    page->drawn = false;
-    page->send(bytes, true);
-  }
+  for (const auto& page : std::set(pages_))
+    if (page->drawn) page->send_picture(bytes);
+  count();
+}
+
+/// A page that was slow gets what it has missed: there may be no other picture, as the run may be at rest.
+void Server::Implementation::drawn(Page& page) {
+  page.drawn = true;
+  if (page.behind(last_picture_)) page.send_picture(last_picture_);
   count();
 }
 
