@@ -66,9 +66,10 @@ class Notes : public Viewer {
   std::vector<ordered_json> told_;
 };
 
-/// The reference, until a particle escapes.
-class Failing : public Backend {
+/// The reference, until a particle escapes, if one is to. It notes how many substeps each call takes.
+class Noting : public Backend {
  public:
+  Noting(std::vector<int>& calls, bool fails) : calls_(calls), fails_(fails) {}
   BackendInfo info() const override { return inner_->info(); }
   void load(const Scene& scene, const Walls& walls, const ParticleState& state) override {
     now_ = state.substep;
@@ -77,13 +78,16 @@ class Failing : public Backend {
   Status evaluate(Fields& out, const StageInputs* given) override { return inner_->evaluate(out, given); }
   Status advance(int substeps) override {
     now_ += substeps;
-    return now_ > 40 ? Status{Status::escaped, 17, now_} : inner_->advance(substeps);
+    calls_.push_back(substeps);
+    return fails_ && now_ > 40 ? Status{Status::escaped, 17, now_} : inner_->advance(substeps);
   }
   void read(ParticleState& out) const override { inner_->read(out); }
   StageTimes stage_times() const override { return inner_->stage_times(); }
   NeighborStats neighbor_stats() const override { return inner_->neighbor_stats(); }
 
  private:
+  std::vector<int>& calls_;
+  const bool fails_;
   std::unique_ptr<Backend> inner_ = make_reference_backend();
   std::int64_t now_ = 0;
 };
@@ -94,10 +98,11 @@ class LiveRun : public testing::Test {
     Options options;
     options.backend = backend;
     options.backends = {"reference", "failing"};
-    options.make_backend = [](const std::string& choice) -> std::unique_ptr<Backend> {
-      if (choice == "failing") return std::make_unique<Failing>();
-      if (choice != "reference") throw InputError("command line", "--backend", choice, "reference or failing");
-      return make_reference_backend();
+    options.make_backend = [this](const std::string& choice) -> std::unique_ptr<Backend> {
+      const bool fails = choice == "failing";
+      if (!fails && !choice.starts_with("reference"))
+        throw InputError("command line", "--backend", choice, "reference or failing");
+      return std::make_unique<Noting>(calls_, fails);
     };
     options.keep = folder_.path();
     options.paused = paused;
@@ -125,6 +130,7 @@ class LiveRun : public testing::Test {
   }
 
   TemporaryFolder folder_;
+  std::vector<int> calls_;  // the run's
   Notes notes_;
   std::unique_ptr<live::Run> run_;
   std::atomic<bool> stop_ = false;
@@ -242,6 +248,14 @@ TEST_F(LiveRun, TellsWhereNoBackendCanBeJudged) {
   ask({{"do", "judge"}});
   ASSERT_TRUE(soon([&] { return told("error", "text").find("no backend can pass") != std::string::npos; }, 60));
   EXPECT_TRUE(notes_.last("verdict").is_null());
+}
+
+TEST_F(LiveRun, ListsOfAFixedIntervalGetAsOldAsWasAsked) {
+  begin("reference:rebuild=37");
+  ASSERT_TRUE(soon([&] { return notes_.substep() > 37 * 4; }));
+  TearDown();
+  ASSERT_GT(calls_.size(), 2u);
+  for (const int substeps : calls_) EXPECT_EQ(substeps % 37, 36) << "lists one substep before they are rebuilt";
 }
 
 TEST_F(LiveRun, ScoresFollow) {

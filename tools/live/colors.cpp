@@ -5,7 +5,6 @@
 #include "reference/scene_checks.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 namespace decant::live {
@@ -39,11 +38,8 @@ void color(Colors& colors, const ParticleState& state, const Results& results) {
                             .cast<double>();
       break;
     case Quantity::score:
-      if (const auto& scores = results.scores; scores && scores->values.size() == state.size()) {
+      if (const auto& scores = results.scores; scores && scores->values.size() == state.size())
         colors.values = scores->values;
-        // An infinite score stands at the end of any scale.
-        colors.largest = std::isfinite(scores->largest) ? std::max(1.0, scores->largest) : 10.0;
-      }
       break;
     case Quantity::density:
     case Quantity::pressure:

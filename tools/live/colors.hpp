@@ -11,7 +11,7 @@
 namespace decant::live {
 
 /// The scale that fits the scene: speed up to the one that its time step was derived for, v; density ρ0 ± 5 %; pressure
-/// up to ρ0 v²/2; region and score: see color.
+/// up to ρ0 v²/2; score up to 1, whose color all have that do not conform.
 Colors scale_of(Quantity quantity, const Scene& scene);
 
 /// What was found out beside the loop, of an instant a little earlier; null: nothing yet.
@@ -20,7 +20,7 @@ struct Results {
   std::shared_ptr<const Scores> scores;
 };
 
-/// Fills in the values; those of density and pressure are there. The scale of scores goes from 0 to 1, or to the largest.
+/// Fills in the values; those of density and pressure are there.
 void color(Colors& colors, const ParticleState& state, const Results& results);
 
 }  // namespace decant::live

@@ -22,6 +22,7 @@
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
+#include <cstdlib>
 #include <deque>
 #include <mutex>
 #include <optional>
@@ -54,6 +55,12 @@ StageTimes operator-(StageTimes a, const StageTimes& b) {
 }
 
 bool finite(const ParticleState& state) { return pour::all_finite(state.position) && pour::all_finite(state.velocity); }
+
+/// N of lists rebuilt every N substeps; else 1.
+std::int64_t rebuild_interval(const std::string& choice) {
+  const auto at = choice.find(":rebuild=");
+  return at == choice.npos ? 1 : std::max(1L, std::atol(choice.c_str() + at + 9));
+}
 
 /// A mean in which the last few count most.
 void follow(double& mean, double value) { mean = mean > 0 ? 0.8 * mean + 0.2 * value : value; }
@@ -315,12 +322,18 @@ ParticleState Run::Implementation::state_now() {
 
 std::int64_t Run::Implementation::substeps_until(double seconds) const {
   if (steps_ > 0) return 1;
+  // Lists begin anew with every call. Of a fixed interval they would be younger than was asked for; one substep less
+  // than whole intervals, and a picture's scores are those of lists at their oldest.
+  const std::int64_t interval = rebuild_interval(choice_);
   double n = std::clamp(std::floor(rate_ * seconds), 1.0, 1e6);
   if (speed_ > 0) {
     const double allowed = speed_ * seconds_since(paced_from_) / running_->time_step();
     n = std::min(n, std::floor(allowed - static_cast<double>(substep_ - paced_substep_)));
   }
-  return n < 1 ? 0 : scene_.until_arrival(substep_, static_cast<std::int64_t>(n));
+  if (n < 1) return 0;
+  auto whole = static_cast<std::int64_t>(n);
+  if (interval > 1) whole = (whole + interval) / interval * interval - 1;
+  return scene_.until_arrival(substep_, whole);
 }
 
 void Run::Implementation::advance(std::int64_t n) {

@@ -199,23 +199,28 @@ function showStatus(message) {
   curves.add(message);
 }
 
+/** A line per check: its largest score, or how many of its rows fail. */
 function showVerdict(message) {
-  const failing = message.rows.filter((row) => row.verdict !== "pass");
-  const largest = {};
-  for (const row of message.rows.filter((one) => one.verdict === "pass"))
-    if (!(largest[row.check]?.score >= row.score)) largest[row.check] = row;
+  const checks = new Map();
+  for (const row of message.rows) {
+    const of = checks.get(row.check) ?? { rows: 0, failing: 0, worst: row };
+    ++of.rows;
+    const fails = row.verdict !== "pass", worse = fails - (of.worst.verdict !== "pass") || (row.score ?? 0) - (of.worst.score ?? 0);
+    of.failing += fails;
+    if (worse > 0) of.worst = row;
+    checks.set(row.check, of);
+  }
   const table = document.createElement("table");
-  for (const row of [...failing, ...Object.values(largest)]) {
-    const line = document.createElement("tr");
-    line.append(text("td", `${row.check}, ${row.field}`), text("td", row.verdict, row.verdict),
-      text("td", row.score === undefined ? "" : row.score.toPrecision(3)));
-    if (row.reason) line.title = row.reason;
+  const ordered = [...checks].sort(([, one], [, other]) => (other.failing > 0) - (one.failing > 0));
+  for (const [check, { rows, failing, worst }] of ordered) {
+    const line = document.createElement("tr"), verdict = failing ? "fail" : "pass";
+    line.append(text("td", check), text("td", failing ? `${failing} of ${rows} fail` : "pass", verdict),
+      text("td", worst.score === undefined ? "" : worst.score.toPrecision(3)));
     table.append(line);
-    if (row.reason && row.verdict === "fail") {
-      const why = document.createElement("tr");
-      why.append(Object.assign(text("td", row.reason), { colSpan: 3 }));
-      table.append(why);
-    }
+    if (!failing) continue;
+    const why = document.createElement("tr");
+    why.append(Object.assign(text("td", `${worst.field}: ${worst.reason ?? ""}`, "why"), { colSpan: 3 }));
+    table.append(why);
   }
   element("verdict").append(text("p", `${message.rows.length} rows: ${message.verdict}`, message.verdict), table);
   element("verdict").dataset.verdict = message.verdict;
@@ -232,7 +237,7 @@ function legend(picture, quantity) {
   const regions = quantity === "region";
   element("scale").hidden = regions;
   element("least").textContent = regions ? "" : picture.least.toPrecision(3);
-  element("largest").textContent = regions ? "" : picture.largest.toPrecision(4);
+  element("largest").textContent = regions ? "" : quantity === "score" ? "1 or more" : picture.largest.toPrecision(4);
   element("unit").textContent = UNITS[quantity];
   if (regions) {
     ["source", "in flight", "receiver", "spilled", "lost"].forEach((name, k) => {

@@ -6,7 +6,8 @@ const GRADIENTS = {
   speed: ["#2a186c", "#14439c", "#206e8b", "#3c9387", "#5ab978", "#aad85c", "#fdef9a"],
   density: ["#2166ac", "#67a9cf", "#d1e5f0", "#f7f7f7", "#fddbc7", "#ef8a62", "#b2182b"],
   pressure: ["#0d0887", "#5c01a6", "#9c179e", "#cc4778", "#ed7953", "#fdb42f", "#f0f921"],
-  score: ["#1b3a4b", "#2f6f73", "#5fa777", "#b8c95a", "#f2b134", "#ed553b", "#ff0033"],
+  // Red is beyond tolerance.
+  score: ["#1b3a4b", "#26535c", "#2f6f73", "#46907a", "#5fa777", "#8fb968", "#b8c95a", "#e8d44d", "#ff0033"],
 };
 const REGION_COLORS = ["#5b9bff", "#ffffff", "#5fd38d", "#f2a93b", "#ff4d4d"];
 
