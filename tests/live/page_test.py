@@ -6,6 +6,8 @@
 Needs Chromium and its driver, and selenium. DECANT_SCREENSHOTS names a folder for a picture of each page.
 """
 
+import asyncio
+import functools
 import io
 import json
 import os
@@ -15,6 +17,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import unittest
 from pathlib import Path
@@ -53,11 +56,35 @@ class Live:
         return status
 
 
+class Tunnel:
+    """Another port of this machine that leads to the one of `decant live`, as `ssh -L` makes it."""
+
+    def __init__(self, port):
+        self.loop = asyncio.new_event_loop()
+        threading.Thread(target=self.loop.run_forever, daemon=True).start()
+        starting = asyncio.start_server(functools.partial(self.join, port), "127.0.0.1", 0)
+        self.server = asyncio.run_coroutine_threadsafe(starting, self.loop).result()
+        self.port = self.server.sockets[0].getsockname()[1]
+
+    async def join(self, port, near_in, near_out):
+        far_in, far_out = await asyncio.open_connection("127.0.0.1", port)
+        await asyncio.gather(self.carry(near_in, far_out), self.carry(far_in, near_out))
+
+    async def carry(self, source, sink):
+        while data := await source.read(1 << 16):
+            sink.write(data)
+            await sink.drain()
+        sink.close()
+
+    def end(self):
+        self.loop.call_soon_threadsafe(self.server.close)
+
+
 def browser():
     options = webdriver.ChromeOptions()
     options.binary_location = shutil.which("chromium")
     for one in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-angle=swiftshader",
-                "--enable-unsafe-swiftshader", "--window-size=1280,800"):
+                "--enable-unsafe-swiftshader", "--window-size=1000,700"):
         options.add_argument(one)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     return webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)
@@ -135,8 +162,9 @@ class PageTest(unittest.TestCase):
     def test_a_cup_is_dragged(self):
         # Where the source is drawn: found by what the pointer looks like there.
         canvas = self.find("canvas")
-        for x in range(-400, 0, 20):
-            ActionChains(self.browser).move_to_element_with_offset(canvas, x, -80).perform()
+        width, height = canvas.size["width"], canvas.size["height"]
+        for x in range(-4 * width // 10, 0, 20):
+            ActionChains(self.browser).move_to_element_with_offset(canvas, x, -height // 8).perform()
             if canvas.value_of_css_property("cursor") == "ew-resize":
                 break
         else:
@@ -250,6 +278,16 @@ class PageTest(unittest.TestCase):
     def test_the_end_of_the_run_is_told(self):
         self.live.process.send_signal(signal.SIGINT)
         self.until(lambda: "The run has ended" in self.messages(), "the end")
+
+    def test_through_a_tunnel(self):
+        own, token = re.match(r"http://127.0.0.1:(\d+)/(\w+)/", self.live.address).groups()
+        tunnel = Tunnel(int(own))
+        try:
+            for name in ("localhost", "127.0.0.1"):
+                self.browser.get(f"http://{name}:{tunnel.port}/{token}/")
+                self.until(lambda: self.js("live.drawn") > 2, "pictures come through the tunnel")
+        finally:
+            tunnel.end()
 
     def test_other_origins_and_wrong_tokens_are_refused(self):
         socket = self.live.address.replace("http", "ws") + "socket"
