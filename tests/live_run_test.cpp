@@ -4,6 +4,7 @@
 #include "oracle/files/temporary_folder.hpp"
 #include "oracle/solution/reference_backend.hpp"
 #include "reference/error.hpp"
+#include "reference/initial_state.hpp"
 #include "tests/live/cups.hpp"
 #include "tools/live/picture.hpp"
 #include "tools/live/run.hpp"
@@ -15,6 +16,7 @@
 #include <cstring>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
@@ -100,13 +102,16 @@ class LiveRun : public testing::Test {
     options.backends = {"reference", "failing"};
     options.make_backend = [this](const std::string& choice) -> std::unique_ptr<Backend> {
       const bool fails = choice == "failing";
+      if (choice == "absent") throw BackendError("not here");
       if (!fails && !choice.starts_with("reference"))
         throw InputError("command line", "--backend", choice, "reference or failing");
       return std::make_unique<Noting>(calls_, fails);
     };
     options.keep = folder_.path();
+    options.start = start_;
     options.paused = paused;
     run_ = std::make_unique<live::Run>(cups(), std::move(options), notes_);
+    run_->start();
     thread_ = std::thread([this] { run_->go([this] { return stop_.load(); }); });
   }
   void TearDown() override {
@@ -131,6 +136,7 @@ class LiveRun : public testing::Test {
 
   TemporaryFolder folder_;
   std::vector<int> calls_;  // the run's
+  std::optional<ParticleState> start_;
   Notes notes_;
   std::unique_ptr<live::Run> run_;
   std::atomic<bool> stop_ = false;
@@ -179,7 +185,11 @@ TEST_F(LiveRun, TellsWhatIsWrongAndGoesOn) {
   begin();
   for (const auto& [asked, answer] : std::vector<std::pair<std::string, std::string>>{
            {R"({"do":"set","pointer":"/fluid/viscosity","value":-1})", "cups.json: fluid.viscosity = -1"},
+           {R"({"do":"set","pointer":"/containers/9999999999999","value":1})", "no such place"},
+           {R"({"do":"set","pointer":"/gravity/3","value":1})", "no such place"},
+           {R"({"do":"particles","value":100000000000})", "this machine's memory"},
            {R"({"do":"backend","choice":"teapot"})", "--backend = teapot"},
+           {R"({"do":"backend","choice":"absent"})", "not here"},
            {R"({"do":"tilt","container":"receiver","degrees":3})", "a container that can tilt"},
            {R"({"do":"color","by":"mood"})", "mood"},
            {R"({"do":"dance"})", "dance"},
@@ -246,7 +256,7 @@ TEST_F(LiveRun, KeepsAndJudgesTheInstant) {
 TEST_F(LiveRun, TellsWhereNoBackendCanBeJudged) {
   begin("reference", true);  // on its lattice, where hundreds of pairs are at H
   ask({{"do", "judge"}});
-  ASSERT_TRUE(soon([&] { return told("error", "text").find("no backend can pass") != std::string::npos; }, 60));
+  ASSERT_TRUE(soon([&] { return told("kept", "objection").find("no backend can pass") != std::string::npos; }, 60));
   EXPECT_TRUE(notes_.last("verdict").is_null());
 }
 
@@ -256,6 +266,32 @@ TEST_F(LiveRun, ListsOfAFixedIntervalGetAsOldAsWasAsked) {
   TearDown();
   ASSERT_GT(calls_.size(), 2u);
   for (const int substeps : calls_) EXPECT_EQ(substeps % 37, 36) << "lists one substep before they are rebuilt";
+}
+
+TEST_F(LiveRun, AResetOfARecordingIsAtItsTimeWhateverTheSubstep) {
+  LiveScene scene = cups();
+  start_.emplace(initial_state(scene.running()));
+  start_->substep = 3000;
+  begin("reference", true);
+  ASSERT_TRUE(soon([&] { return notes_.pictures() > 0; }));
+  const double time = notes_.of_picture(4);
+  EXPECT_NEAR(time, scene.running().time_at(3000), 1e-12);
+  ask({{"do", "set"}, {"pointer", "/fluid/viscosity"}, {"value", 30.0}});
+  ask({{"do", "reset"}});
+  ASSERT_TRUE(soon([&] { return notes_.substep() > 3000; })) << "of shorter substeps";
+  EXPECT_NEAR(notes_.of_picture(4), time, 1e-12);
+  ask({{"do", "set"}, {"pointer", "/fill/0/level"}, {"value", 0.02}});
+  ASSERT_TRUE(soon([&] { return notes_.of_picture(1) == 96 && notes_.substep() == 0; })) << "no longer the recording";
+}
+
+TEST_F(LiveRun, StepsAfterAFailureAreNotKept) {
+  begin("failing");
+  ASSERT_TRUE(soon([&] { return !told("status", "failed").empty(); }));
+  for (int k = 0; k < 5; ++k) ask({{"do", "step"}});
+  ask({{"do", "reset"}});
+  ASSERT_TRUE(soon([&] { return notes_.substep() == 0; }));
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  EXPECT_EQ(notes_.substep(), 0);
 }
 
 TEST_F(LiveRun, ScoresFollow) {

@@ -221,6 +221,17 @@ TEST(LiveScene, AHandTurnsACupFromWhereItIs) {
   EXPECT_EQ(angle_of(scene, now + 3000), angle_of(scene, now)) << "and stays there";
 }
 
+TEST(LiveScene, AHandThatTurnsSlowerThanItDidArrivesAllTheSame) {
+  LiveScene scene = cups();
+  scene.tilt("source", 60, 0);
+  std::int64_t now = 1000;
+  scene.set("/gravity", {0, 0, -0.01}, now);  // a slow fluid, a slow hand
+  scene.set("/gravity", {0, 0, -9.81}, now);
+  int rounds = 0;
+  while (!scene.arrive(now) && ++rounds < 1000) now += scene.until_arrival(now, 500);
+  EXPECT_NEAR(angle_of(scene, now + 5000), 60 * degree, 1e-3);
+}
+
 TEST(LiveScene, AHandGivesACupBackToItsSchedule) {
   LiveScene scene = cups();
   scene.tilt("source", 30, 0);

@@ -151,12 +151,12 @@ class PageTest(unittest.TestCase):
         self.assertEqual(self.js("live.status.mass.receiver"), 0)
         self.browser.execute_script("element('tilt-source').value = 130;"
                                     "element('tilt-source').dispatchEvent(new Event('input'))")
-        self.until(lambda: self.js("live.status.by_hand.length") == 1, "the hand is at work")
+        self.until(lambda: "source" in self.js("live.status.by_hand"), "the hand is at work")
         self.until(lambda: self.js("live.status.mass.receiver") > 0.01, "10 g in the receiver", 120)
         self.assertGreater(self.js("live.status.degrees.source"), 60)
         self.assertAlmostEqual(self.js("Object.values(live.status.mass).reduce((a, b) => a + b)"), 0.041472, 6)
         self.find("schedule-source").click()
-        self.until(lambda: not self.js("live.status.by_hand.length"), "the schedule has it again", 120)
+        self.until(lambda: not self.js("live.status.by_hand"), "the schedule has it again", 120)
         self.assertLess(self.js("live.status.degrees.source"), 11)
 
     def test_a_cup_is_dragged(self):
@@ -171,11 +171,12 @@ class PageTest(unittest.TestCase):
             self.fail("no cup under the pointer")
         ActionChains(self.browser).click_and_hold().move_by_offset(60, 0).release().perform()
         self.until(lambda: self.js("live.status.degrees.source") > 5, "the cup turns")
-        self.assertEqual(self.js("live.status.by_hand"), ["source"])
+        self.assertEqual(list(self.js("live.status.by_hand")), ["source"])
 
     def test_a_bad_value_is_refused_with_the_scenes_own_text(self):
         self.type("viscosity", "-1")
         self.until(lambda: "fluid.viscosity = -1" in self.messages(), "the bound is told")
+        self.assertEqual(self.find("viscosity").get_attribute("value"), "0.05")
         self.type("gx", "down")
         self.until(lambda: "is no number" in self.messages(), "no number")
         self.type("spacing", "0.1")
@@ -240,6 +241,7 @@ class PageTest(unittest.TestCase):
         Select(self.find("color")).select_by_value("density")
         self.find("pause").click()
         self.until(lambda: self.js("live.status.paused") and self.js("live.legend").startswith("density"), "both here")
+        self.until(lambda: self.js("live.status.substep === live.picture.substep"), "at rest")
         second = self.js("[live.picture.substep, Array.from(live.picture.particles)]")
         self.browser.close()
         self.browser.switch_to.window(first)

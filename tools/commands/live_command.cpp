@@ -15,14 +15,18 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <climits>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
+#include <thread>
 
 namespace decant {
 namespace {
@@ -67,6 +71,22 @@ Start start_of(const std::string& file) {
   return {live::LiveScene({std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()}, file), std::nullopt};
 }
 
+/// Ends the server before the run that its pages ask.
+struct Serving {
+  live::Server& server;
+  ~Serving() { server.stop(); }
+};
+
+/// Ends the process a second after a signal: a scene that is made, or a long call of a backend, has no end to wait for.
+void leave_late(const std::stop_token& done) {
+  int waited = 0;
+  while (!done.stop_requested() && waited < 20) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    if (StopSignal::caught() != 0) ++waited;
+  }
+  if (!done.stop_requested()) std::_Exit(128 + StopSignal::caught());
+}
+
 std::string host_name() {
   char name[HOST_NAME_MAX + 1] = {};
   return ::gethostname(name, sizeof name - 1) == 0 ? name : "HOST";
@@ -77,6 +97,10 @@ int run(LiveArguments& arguments) {
     throw InputError("command line", "--pictures", fmt::format("{}", arguments.pictures),
                      "must be in 0 … 1000 per second");
   check_output_folder("--keep", arguments.keep);
+  const std::filesystem::path keep(arguments.keep);
+  if (const auto holds = is_directory(keep) ? keep : std::filesystem::absolute(keep / "").parent_path().parent_path();
+      ::access(holds.c_str(), W_OK) != 0)
+    throw InputError("command line", "--keep", arguments.keep, "a folder that can be written to");
   auto [scene, state] = start_of(arguments.scene);
   if (arguments.particles && state)
     throw InputError("command line", "--particles", std::to_string(*arguments.particles), "a scene, not a recording");
@@ -95,21 +119,24 @@ int run(LiveArguments& arguments) {
   options.pictures_per_second = arguments.pictures;
   options.paused = arguments.paused;
 
+  options.executor = arguments.executor;
+
   const StopSignal signal;
-  std::unique_ptr<live::Run> pour;
-  live::Server server(arguments.port, [&](std::string ask) {
-    if (pour) pour->ask(std::move(ask));
-  });
-  pour = std::make_unique<live::Run>(std::move(scene), std::move(options), server);
+  const std::jthread impatience(leave_late);
+  live::Server server(arguments.port);
+  live::Run pour(std::move(scene), std::move(options), server);
+  pour.start();
+  server.serve([&](std::string ask) { pour.ask(std::move(ask)); });
+  const Serving serving{server};
   fmt::print("{}\n", server.address());
   if (!arguments.quiet)
     fmt::print("Ctrl-C ends it. From another machine: ssh -N -L {0}:127.0.0.1:{0} {1}, then the same address there.\n",
                server.port(), host_name());
   std::fflush(stdout);
-  pour->go([] { return StopSignal::caught() != 0; });
+  pour.go([] { return StopSignal::caught() != 0; });
   const int status = 128 + StopSignal::caught();
   // A recording under way is given up: what is not whole leaves no file.
-  if (pour->busy()) std::_Exit(status);
+  if (pour.busy()) std::_Exit(status);
   return status;
 }
 

@@ -9,6 +9,7 @@
 #include "reference/scene_json_reader.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -67,9 +68,19 @@ void LiveScene::take(ordered_json json, Parsed parsed) {
   warnings_ = std::move(parsed.warnings);
 }
 
-void LiveScene::restart() {
+void LiveScene::restart(int multiple_of) {
   hands_.clear();
   running_ = given_;
+  int& substeps = running_.schedule.substeps_per_frame;
+  if (substeps % multiple_of == 0) return;
+  substeps = (substeps + multiple_of - 1) / multiple_of * multiple_of;
+  running_.schedule.substeps_derived = false;
+}
+
+std::map<std::string, double> LiveScene::hand_targets() const {
+  std::map<std::string, double> targets;
+  for (const auto& [name, hand] : hands_) targets[name] = hand.target / degree;
+  return targets;
 }
 
 void LiveScene::replace(const std::string& text) {
@@ -80,8 +91,13 @@ void LiveScene::replace(const std::string& text) {
 }
 
 void LiveScene::set_particles(std::int64_t particles) {
-  if (particles < 1 || particles > 1'000'000'000)
-    throw InputError(file_, "particles", std::to_string(particles), "must be 1 … 1000000000");
+  // On the host a particle takes this much with its neighbors and its part of the walls, at least.
+  constexpr double bytes = 600;
+  const auto most = static_cast<std::int64_t>(static_cast<double>(::sysconf(_SC_PHYS_PAGES)) *
+                                              static_cast<double>(::sysconf(_SC_PAGESIZE)) / bytes);
+  if (particles < 1 || particles > most)
+    throw InputError(file_, "particles", std::to_string(particles),
+                     fmt::format("must be 1 … {}, which this machine's memory holds", most));
   ordered_json json = json_;
   json["particle_spacing"] = with_particles(given_, particles).particle_spacing;
   Parsed parsed = parse(json);
@@ -92,7 +108,10 @@ void LiveScene::set_particles(std::int64_t particles) {
 LiveScene::Outcome LiveScene::set(const std::string& pointer, const ordered_json& value, std::int64_t& substep) {
   ordered_json json = json_;
   try {
-    json[ordered_json::json_pointer(pointer)] = value;
+    // A key may be new; an index may not, which nlohmann-json would fill an array up to.
+    const ordered_json::json_pointer place(pointer);
+    if (!json.at(place.parent_pointer()).is_object()) (void)json.at(place);
+    json[place] = value;
   } catch (const ordered_json::exception&) {
     throw InputError(file_, pointer, value.dump(), "no such place in this scene");
   }
@@ -112,8 +131,9 @@ LiveScene::Outcome LiveScene::set(const std::string& pointer, const ordered_json
   running_.schedule.substeps_per_frame = before * factor;
   running_.schedule.substeps_derived =
       running_.schedule.substeps_per_frame == needed && given_.schedule.substeps_derived;
-  if (!hands_.empty()) running_.schedule.max_speed = expected_max_speed(given_);
   substep *= factor;
+  // Their rate follows from the scene's speeds.
+  for (const auto& [name, hand] : std::map(hands_)) turn(name, hand, substep);
   return Outcome::goes_on;
 }
 
@@ -179,7 +199,8 @@ bool LiveScene::arrive(std::int64_t substep) {
   for (auto& [name, hand] : std::map(hands_)) {
     Container& container = running_container(name);
     const double angle = tilt_at(*container.tilt, running_.time_at(substep)).angle;
-    const double width = 0.75 * hand_rate(container) * running_.time_step();
+    const double width = 0.75 * std::abs(container.tilt->rate) * running_.time_step();
+    const bool passed = (hand.target - angle) * container.tilt->rate < 0;
     if (hand.to_schedule) {
       const double target = scheduled(name, substep);
       if (std::abs(target - angle) <= width) {
@@ -191,7 +212,7 @@ bool LiveScene::arrive(std::int64_t substep) {
         turn(name, {target, true, false}, substep);
       }
       changed = true;
-    } else if (hand.moving && std::abs(hand.target - angle) <= width) {
+    } else if (hand.moving && (passed || std::abs(hand.target - angle) <= width)) {
       turn(name, {angle, false, false}, substep);
       hands_[name].moving = false;
       changed = true;

@@ -38,8 +38,8 @@ class LiveScene {
   void replace(const std::string& text);
   /// As many particles. Throws InputError, and nothing is changed.
   void set_particles(std::int64_t particles);
-  /// As it was at first: no hand, no shortened substep.
-  void restart();
+  /// As it was at first: no hand, and no substep shorter than a frame's number of them needs to be a multiple of this.
+  void restart(int multiple_of = 1);
 
   /// Turns a container by hand, from where it is at `substep`, at hand_rate. Throws InputError where the container
   /// has no tilt or the angle is not within ±720°.
@@ -48,6 +48,8 @@ class LiveScene {
   void follow_schedule(const std::string& container, std::int64_t substep);
   /// Whether a hand is at work.
   bool by_hand(const std::string& container) const { return hands_.contains(container); }
+  /// Where hands turn containers to, degrees, by name.
+  std::map<std::string, double> hand_targets() const;
 
   /// So many of `substeps` as a hand may go on without a look at where it goes; 1 at least.
   std::int64_t until_arrival(std::int64_t substep, std::int64_t substeps) const;

@@ -101,8 +101,9 @@ ordered_json status_message(const Scene& scene, const LoopStatus& loop, std::int
                       {"crossed", audit.crossed},
                       {"mean_neighbors", loop.neighbors.mean_fluid + loop.neighbors.mean_wall},
                       {"device_bytes", loop.neighbors.device_bytes},
-                      {"rebuilds", loop.neighbors.rebuilds},
-                      {"by_hand", loop.by_hand}};
+                      {"rebuilds", loop.neighbors.rebuilds}};
+  out["by_hand"] = ordered_json::object();
+  for (const auto& [name, degrees] : loop.by_hand) out["by_hand"][name] = degrees;
   if (!loop.failed.empty()) out["failed"] = loop.failed;
   for (std::size_t k = 0; k < region_names.size(); ++k) out["mass"][region_names[k]] = audit.mass_at[k];
   out["stages"] = {{"build", microseconds(loop.stages.build)},

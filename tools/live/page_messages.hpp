@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -25,7 +26,7 @@ struct LoopStatus {
   double pictures_per_second = 0;
   StageTimes stages;  // since the status before
   NeighborStats neighbors;
-  std::vector<std::string> by_hand;  // containers
+  std::map<std::string, double> by_hand;  // degrees that hands turn containers to
 };
 
 /// "scene": what is drawn, what can be changed and what it is now.

@@ -73,6 +73,7 @@ class Run::Implementation {
       : options_(std::move(options)),
         viewer_(viewer),
         scene_(std::move(scene)),
+        recorded_substeps_(scene_.running().schedule.substeps_per_frame),
         from_(options_.start),
         paused_(options_.paused) {}
 
@@ -82,10 +83,13 @@ class Run::Implementation {
     wake_.notify_all();
   }
 
-  void go(const std::function<bool()>& stop) {
+  void begin() {
     choice_ = options_.backend;
     backend_ = options_.make_backend(choice_);
     start();
+  }
+
+  void go(const std::function<bool()>& stop) {
     while (!stop()) {
       answer();
       if (!advances()) {
@@ -104,7 +108,7 @@ class Run::Implementation {
     }
   }
 
-  bool busy() const { return !keeping_.idle(); }
+  bool busy() const { return !keeping_.idle() || !scoring_.idle(); }
 
  private:
   bool advances() const { return (!paused_ || steps_ > 0) && failed_.empty(); }
@@ -122,13 +126,15 @@ class Run::Implementation {
   void answer(const ordered_json& ask);
   void start();
   void start_anew(const LiveScene& before, const std::string& why);
-  void load(ParticleState state);
+  void adopt(ParticleState state);
+  void load();
   void change_backend(const std::string& choice);
   void keep(bool judged);
+  void beside(Background& where, std::function<void()> work);
   void tell_scene();
   void fail(const std::string& why);
   ParticleState state_now();
-  std::int64_t substeps_until(double seconds) const;
+  std::int64_t substeps_until(double seconds);
   void advance(std::int64_t n);
   void show();
   void score(const SharedState& state);
@@ -146,6 +152,7 @@ class Run::Implementation {
   const Options options_;
   Viewer& viewer_;
   LiveScene scene_;
+  const int recorded_substeps_;           // of a frame, by which from_ counts
   std::optional<ParticleState> from_;     // where the run starts, while it has the recording's particles
   std::shared_ptr<const Scene> running_;  // a copy that others may hold
   Walls walls_;
@@ -194,7 +201,7 @@ void Run::Implementation::answer() {
       viewer_.tell({{"type", "error"}, {"text", "not understood: " + text.substr(0, 200)}});
     } catch (const InputError& error) {
       viewer_.tell({{"type", "error"}, {"text", error.what()}});
-    } catch (const BackendError& error) {
+    } catch (const std::exception& error) {
       fail(error.what());
     }
     stale_ = true;
@@ -209,12 +216,12 @@ void Run::Implementation::answer(const ordered_json& ask) {
     paused_ = true;
   } else if (what == "go_on") {
     paused_ = false;
+    steps_ = 0;
     set_pace();
   } else if (what == "step") {
     paused_ = true;
-    ++steps_;
+    if (failed_.empty()) ++steps_;
   } else if (what == "reset") {
-    scene_.restart();
     start();
   } else if (what == "speed") {
     speed_ = std::max(0.0, ask.at("value").get<double>());
@@ -225,8 +232,9 @@ void Run::Implementation::answer(const ordered_json& ask) {
     if (scene_.set(pointer, ask.at("value"), state.substep) == LiveScene::Outcome::restarts) {
       start_anew(before, pointer + " changes which particles there are");
     } else {
-      load(std::move(state));
+      adopt(std::move(state));
       tell_scene();
+      load();
     }
   } else if (what == "particles") {
     scene_.set_particles(ask.at("value").get<std::int64_t>());
@@ -239,7 +247,9 @@ void Run::Implementation::answer(const ordered_json& ask) {
   } else if (what == "tilt" || what == "schedule") {
     if (what == "tilt") scene_.tilt(text("container"), ask.at("degrees").get<double>(), substep_);
     else scene_.follow_schedule(text("container"), substep_);
-    if (failed_.empty()) load(state_now());
+    if (!failed_.empty()) return;
+    adopt(state_now());
+    load();
   } else if (what == "color") {
     quantity_ = quantity_of(text("by"));
   } else if (what == "keep" || what == "judge") {
@@ -249,9 +259,12 @@ void Run::Implementation::answer(const ordered_json& ask) {
   }
 }
 
+/// With the scene as it was at first, or as it was set since; from the recording where there is one.
 void Run::Implementation::start() {
+  scene_.restart(from_ ? recorded_substeps_ : 1);
   Walls walls = sample_walls(scene_.running());
   ParticleState first = from_ ? *from_ : initial_state(scene_.running());
+  if (from_) first.substep *= scene_.running().schedule.substeps_per_frame / recorded_substeps_;
   scoring_.wait();
   audit_.wait();
   walls_ = std::move(walls);
@@ -261,12 +274,15 @@ void Run::Implementation::start() {
     results_ = {};
   }
   rate_ = 0;
-  load(std::move(first));
+  steps_ = 0;
+  adopt(std::move(first));
   tell_scene();
+  load();
 }
 
 /// From a scene that was changed. One that cannot start leaves all as it was.
 void Run::Implementation::start_anew(const LiveScene& before, const std::string& why) {
+  viewer_.tell({{"type", "note"}, {"text", why + "; the run starts anew"}});
   const auto from = std::exchange(from_, std::nullopt);
   try {
     start();
@@ -275,33 +291,43 @@ void Run::Implementation::start_anew(const LiveScene& before, const std::string&
     from_ = from;
     throw;
   }
-  viewer_.tell({{"type", "note"}, {"text", why + "; the run starts anew"}});
 }
 
-/// Takes the state and the scene as it is now.
-void Run::Implementation::load(ParticleState state) {
+/// Takes the scene as it is now, and this state.
+void Run::Implementation::adopt(ParticleState state) {
   failed_.clear();
-  substep_ = state.substep;
+  substep_ = told_substep_ = state.substep;
+  told_ = {};
   running_ = std::make_shared<const Scene>(scene_.running());
   last_ = std::make_shared<const ParticleState>(std::move(state));
-  backend_->load(*running_, walls_, *last_);
   fields_ = Fields::unwritten(last_->size(), walls_.size());
   stages_before_ = {};
   stale_ = true;
   set_pace();
 }
 
-void Run::Implementation::tell_scene() {
-  viewer_.tell(scene_message(scene_, last_->size(), walls_.size(), backend_->info(), choice_, options_.backends));
+void Run::Implementation::load() {
+  try {
+    backend_->load(*running_, walls_, *last_);
+  } catch (const InputError& error) {
+    throw BackendError(error.what());  // the scene stands, and this backend does not take it
+  }
 }
 
+/// One that cannot be had, or does not take the scene, leaves the one before.
 void Run::Implementation::change_backend(const std::string& choice) {
-  auto backend = options_.make_backend(choice);
   ParticleState state = state_now();
+  std::unique_ptr<Backend> backend;
+  try {
+    backend = options_.make_backend(choice);
+    backend->load(scene_.running(), walls_, state);
+  } catch (const BackendError& error) {
+    return viewer_.tell({{"type", "error"}, {"text", fmt::format("{}: {}", choice, error.what())}});
+  }
   backend_ = std::move(backend);
   choice_ = choice;
   rate_ = 0;
-  load(std::move(state));
+  adopt(std::move(state));
   tell_scene();
 }
 
@@ -320,19 +346,26 @@ ParticleState Run::Implementation::state_now() {
   return state;
 }
 
-std::int64_t Run::Implementation::substeps_until(double seconds) const {
+std::int64_t Run::Implementation::substeps_until(double seconds) {
   if (steps_ > 0) return 1;
-  // Lists begin anew with every call. Of a fixed interval they would be younger than was asked for; one substep less
-  // than whole intervals, and a picture's scores are those of lists at their oldest.
-  const std::int64_t interval = rebuild_interval(choice_);
   double n = std::clamp(std::floor(rate_ * seconds), 1.0, 1e6);
   if (speed_ > 0) {
-    const double allowed = speed_ * seconds_since(paced_from_) / running_->time_step();
-    n = std::min(n, std::floor(allowed - static_cast<double>(substep_ - paced_substep_)));
+    const double per_second = speed_ / running_->time_step();
+    const auto allowed = [&] {
+      return per_second * seconds_since(paced_from_) - static_cast<double>(substep_ - paced_substep_);
+    };
+    // A second that was lost, while a scene was made, is not caught up with.
+    if (allowed() > per_second + 1) set_pace();
+    n = std::min(n, std::floor(allowed()));
   }
   if (n < 1) return 0;
   auto whole = static_cast<std::int64_t>(n);
-  if (interval > 1) whole = (whole + interval) / interval * interval - 1;
+  // Lists begin anew with every call. Of a fixed interval they would be younger than was asked for; one substep less
+  // than whole intervals, and a picture's scores are those of lists at their oldest. An interval of more than half a
+  // second would leave no time to answer.
+  if (const std::int64_t interval = rebuild_interval(choice_);
+      interval > 1 && static_cast<double>(interval) <= std::max(100.0, 0.5 * rate_))
+    whole = (whole + interval) / interval * interval - 1;
   return scene_.until_arrival(substep_, whole);
 }
 
@@ -347,10 +380,16 @@ void Run::Implementation::advance(std::int64_t n) {
     // A first call warms up: memory, graphs, threads.
     if (const double seconds = seconds_since(before); n > 1 || rate_ == 0)
       follow(rate_, static_cast<double>(n) / seconds);
-    if (scene_.arrive(substep_)) load(state_now());
-  } catch (const BackendError& error) {
+    if (!scene_.arrive(substep_)) return;
+    adopt(state_now());
+    load();
+  } catch (const std::exception& error) {
     fail(error.what());
   }
+}
+
+void Run::Implementation::tell_scene() {
+  viewer_.tell(scene_message(scene_, last_->size(), walls_.size(), backend_->info(), choice_, options_.backends));
 }
 
 LoopStatus Run::Implementation::loop_status() {
@@ -368,8 +407,7 @@ LoopStatus Run::Implementation::loop_status() {
     stages_before_ = now;
     loop.neighbors = backend_->neighbor_stats();
   }
-  for (const Container& container : running_->containers)
-    if (scene_.by_hand(container.name)) loop.by_hand.push_back(container.name);
+  loop.by_hand = scene_.hand_targets();
   told_ = Clock::now();
   told_substep_ = substep_;
   return loop;
@@ -392,10 +430,10 @@ void Run::Implementation::show() {
       colors->values = wanted;
     }
     if (quantity_ == Quantity::score && scoring_.idle() && failed_.empty()) score(last_);
-  } catch (const BackendError& error) {
+  } catch (const std::exception& error) {
     return fail(error.what());
   }
-  view_.start([this, state = last_, scene = running_, colors, results = results()] {
+  beside(view_, [this, state = last_, scene = running_, colors, results = results()] {
     color(*colors, *state, results);
     viewer_.picture(picture_of(*scene, *state, *colors));
   });
@@ -414,7 +452,7 @@ void Run::Implementation::show() {
 
 /// Where the water is, and the status. Of a million particles it takes longer than a picture.
 void Run::Implementation::audit(const SharedState& state) {
-  audit_.start([this, state, scene = running_, loop = loop_status()] {
+  beside(audit_, [this, state, scene = running_, loop = loop_status()] {
     const auto start = Clock::now();
     // A scene that changed has other walls to pass: paths are followed from there.
     if (audited_ != scene) sampler_.emplace(*scene);
@@ -430,16 +468,12 @@ void Run::Implementation::audit(const SharedState& state) {
 void Run::Implementation::score(const SharedState& state) {
   auto fields = std::make_shared<Fields>(Fields::unwritten(state->size(), walls_.size()));
   if (const Status status = backend_->evaluate(*fields); !status.ok()) return fail(describe(status));
-  scoring_.start([this, state, fields, scene = running_] {
-    try {
-      if (!wall_solution_) wall_solution_ = wall_solution(*scene, walls_);
-      auto scores = std::make_shared<const Scores>(scores_of(*scene, walls_, *wall_solution_, *state, *fields));
-      viewer_.tell(scores_message(*scores));
-      const std::lock_guard lock(mutex_);
-      results_.scores = std::move(scores);
-    } catch (const std::exception& error) {
-      viewer_.tell({{"type", "error"}, {"text", fmt::format("no scores: {}", error.what())}});
-    }
+  beside(scoring_, [this, state, fields, scene = running_] {
+    if (!wall_solution_) wall_solution_ = wall_solution(*scene, walls_);
+    auto scores = std::make_shared<const Scores>(scores_of(*scene, walls_, *wall_solution_, *state, *fields));
+    viewer_.tell(scores_message(*scores));
+    const std::lock_guard lock(mutex_);
+    results_.scores = std::move(scores);
   });
 }
 
@@ -447,18 +481,27 @@ void Run::Implementation::keep(bool judged) {
   if (!keeping_.idle()) throw InputError("page", "keep", "a recording", "one at a time; the one before is not done");
   viewer_.tell({{"type", "note"}, {"text", fmt::format("the oracle evaluates {} particles …", last_->size())}});
   const Instant instant{*running_, state_now(), backend_->info()};
-  keeping_.start([this, instant, judged, choice = choice_] {
+  beside(keeping_, [this, instant, judged, choice = choice_] {
+    const auto [path, ill_posed] = keep_instant(instant, options_.keep);
+    const std::string file = path.string();
+    ordered_json kept = {{"type", "kept"}, {"file", file}, {"judged", judged && ill_posed.empty()}};
+    kept["command"] = fmt::format("decant conform '{}' --backend '{}'{}", file, choice,
+                                  options_.executor == "auto" ? "" : " --executor " + options_.executor);
+    if (!ill_posed.empty()) kept["objection"] = "no verdict: " + ill_posed;
+    viewer_.tell(kept);
+    if (!judged || !ill_posed.empty()) return;
+    ordered_json verdict = judge(path, *options_.make_backend(choice));
+    verdict["type"] = "verdict";
+    verdict["file"] = file;
+    viewer_.tell(verdict);
+  });
+}
+
+/// What fails beside the loop is told, and the run goes on.
+void Run::Implementation::beside(Background& where, std::function<void()> work) {
+  where.start([this, work = std::move(work)] {
     try {
-      const auto [path, ill_posed] = keep_instant(instant, options_.keep);
-      const std::string file = path.string();
-      viewer_.tell(
-          {{"type", "kept"}, {"file", file}, {"command", fmt::format("decant conform {} --backend {}", file, choice)}});
-      if (!ill_posed.empty()) return viewer_.tell({{"type", "error"}, {"text", file + ": " + ill_posed}});
-      if (!judged) return;
-      ordered_json verdict = judge(path, *options_.make_backend(choice));
-      verdict["type"] = "verdict";
-      verdict["file"] = file;
-      viewer_.tell(verdict);
+      work();
     } catch (const std::exception& error) {
       viewer_.tell({{"type", "error"}, {"text", error.what()}});
     }
@@ -469,6 +512,7 @@ Run::Run(LiveScene scene, Options options, Viewer& viewer)
     : implementation_(std::make_unique<Implementation>(std::move(scene), std::move(options), viewer)) {}
 Run::~Run() = default;
 void Run::ask(std::string json) { implementation_->ask(std::move(json)); }
+void Run::start() { implementation_->begin(); }
 void Run::go(const std::function<bool()>& stop) { implementation_->go(stop); }
 bool Run::busy() const { return implementation_->busy(); }
 

@@ -37,6 +37,7 @@ using MakeBackend = std::function<std::unique_ptr<Backend>(const std::string& ch
 
 struct Options {
   std::string backend;                // as on the command line
+  std::string executor;               // as on the command line, for the commands that the page shows
   std::vector<std::string> backends;  // that the page offers
   MakeBackend make_backend;
   std::optional<ParticleState> start;  // of a recording; none: the scene's initial state
@@ -66,9 +67,11 @@ class Run {
 
   /// By any thread: hands over what a page asks. What is wrong with it is told as an "error".
   void ask(std::string json);
-  /// Runs until `stop`. Throws InputError and BackendError where the first start fails.
+  /// Makes the backend and loads the scene. Throws InputError and BackendError.
+  void start();
+  /// Runs until `stop`, after `start`.
   void go(const std::function<bool()>& stop);
-  /// Whether a recording or a verdict is under way, which the destructor would wait for.
+  /// Whether a recording, a verdict or scores are under way, which the destructor would wait for.
   bool busy() const;
 
  private:

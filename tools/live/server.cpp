@@ -10,6 +10,7 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
@@ -44,8 +45,7 @@ class Server::Implementation {
  public:
   class Page;
 
-  Implementation(std::uint16_t port, std::function<void(std::string)> asked)
-      : asked_(std::move(asked)), requests_(Requests::new_token()), acceptor_(loop_) {
+  explicit Implementation(std::uint16_t port) : requests_(Requests::new_token()), acceptor_(loop_) {
     error_code error;
     const tcp::endpoint here(asio::ip::address_v4::loopback(), port);
     acceptor_.open(here.protocol(), error);
@@ -57,15 +57,19 @@ class Server::Implementation {
     port_ = acceptor_.local_endpoint().port();
   }
 
-  void start() {
+  void start(std::function<void(std::string)> asked) {
+    asked_ = std::move(asked);
     accept();
-    thread_ = std::thread([this] { loop_.run(); });
+    thread_ = std::thread([this] { serve(); });
   }
   void stop() {
+    if (!thread_.joinable()) return;
     loop_.stop();
     thread_.join();
+    looking_ = waiting_ = 0;
   }
 
+  void serve();
   void accept();
   void picture(Message bytes);
   void drawn(Page& page);
@@ -75,7 +79,7 @@ class Server::Implementation {
   /// Pages that look, and those among them that have drawn the picture before.
   void count();
 
-  const std::function<void(std::string)> asked_;
+  std::function<void(std::string)> asked_;
   const Requests requests_;
   std::uint16_t port_ = 0;
   std::atomic<int> looking_ = 0, waiting_ = 0;
@@ -83,6 +87,7 @@ class Server::Implementation {
  private:
   asio::io_context loop_;
   tcp::acceptor acceptor_;
+  asio::steady_timer pause_{loop_};
   std::set<std::shared_ptr<Page>> pages_;
   std::map<std::string, Message> last_;  // told, by type; for who comes later
   Message last_picture_;
@@ -210,11 +215,30 @@ void Server::Implementation::Page::write() {
                        });
 }
 
+void Server::Implementation::serve() {
+  for (;;) {
+    try {
+      loop_.run();
+      return;
+    } catch (const std::exception& error) {
+      // Of one page; the others go on.
+      fmt::print(stderr, "decant: {}\n", error.what());
+    }
+  }
+}
+
 void Server::Implementation::accept() {
   acceptor_.async_accept([this](const error_code& error, tcp::socket socket) {
     if (error == asio::error::operation_aborted) return;
-    if (!error) std::make_shared<Page>(std::move(socket), *this)->read_request();
-    accept();
+    if (!error) {
+      std::make_shared<Page>(std::move(socket), *this)->read_request();
+      return accept();
+    }
+    // Without descriptors the next try would fail at once, and so on.
+    pause_.expires_after(std::chrono::milliseconds(100));
+    pause_.async_wait([this](const error_code& ended) {
+      if (!ended) accept();
+    });
   });
 }
 
@@ -258,12 +282,13 @@ void Server::Implementation::tell(const std::string& type, Message text) {
   for (const auto& page : std::set(pages_)) page->send(text, false);
 }
 
-Server::Server(std::uint16_t port, std::function<void(std::string)> asked)
-    : implementation_(std::make_unique<Implementation>(port, std::move(asked))) {
-  implementation_->start();
-}
+Server::Server(std::uint16_t port) : implementation_(std::make_unique<Implementation>(port)) {}
 
-Server::~Server() { implementation_->stop(); }
+Server::~Server() { stop(); }
+
+void Server::serve(std::function<void(std::string)> asked) { implementation_->start(std::move(asked)); }
+
+void Server::stop() { implementation_->stop(); }
 
 std::uint16_t Server::port() const { return implementation_->port_; }
 

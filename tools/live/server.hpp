@@ -17,12 +17,17 @@ namespace decant::live {
 
 class Server : public Viewer {
  public:
-  /// Opens the port and serves by a thread of its own. Throws InputError where the port cannot be had.
-  /// \param port  0: one that is free; \param asked  what pages ask, called by that thread
-  Server(std::uint16_t port, std::function<void(std::string)> asked);
+  /// Opens the port. Throws InputError where it cannot be had.
+  /// \param port  0: one that is free
+  explicit Server(std::uint16_t port);
   ~Server() override;
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
+
+  /// Serves by a thread of its own. \param asked  takes what pages ask; called by that thread, until `stop`
+  void serve(std::function<void(std::string)> asked);
+  /// Ends that thread and hangs up. A run may go on showing: nobody sees it.
+  void stop();
 
   std::uint16_t port() const;
   /// "http://127.0.0.1:PORT/TOKEN/"

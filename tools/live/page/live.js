@@ -9,17 +9,17 @@ const UNITS = { speed: "m/s", density: "kg/m³", pressure: "Pa", region: "", sco
 // For tests and for the console: what this page has seen.
 const live = { drawn: 0, scene: null, status: null, scores: null, picture: null };
 
-const view = new View(element("canvas"), (container, degrees) => {
-  const from = live.hand[container.name] ?? live.status?.degrees?.[container.name] ?? 0;
-  tilt(container, from + degrees);
+let held = 0;  // where the cup that is dragged was
+const view = new View(element("canvas"), (container, degrees, first) => {
+  if (first) held = live.status?.degrees?.[container.name] ?? 0;
+  tilt(container, held + degrees);
 });
 const past = new PictureHistory(element("time"), element("now"), element("shown"), (picture, quantity) => {
-  view.show(picture, quantity);
+  view.show(picture, quantity === "score" && !live.scores ? "unknown" : quantity);
   legend(picture, quantity);
 });
 const curves = new Curves(element);
 let socket, undrawn = 0;
-live.hand = {};
 live.warned = new Set();
 
 function connect() {
@@ -31,7 +31,7 @@ function connect() {
   socket.onmessage = ({ data }) => (typeof data === "string" ? told(JSON.parse(data)) : pictured(data));
   socket.onclose = () => {
     if (!document.querySelector("#messages .lost"))
-      say("The run has ended, or the connection is lost; this page tries again every second.", "error lost", 0);
+      say("The run has ended, or the connection is lost. This page tries again every second; a new run has a new address.", "error lost", 0);
     setTimeout(connect, 1000);
   };
 }
@@ -67,10 +67,18 @@ const tell = {
       ? `at ${message.time.toFixed(4)} s: largest ${largest}, ${message.field} of particle ${message.particle}` : "";
   },
   note: (message) => say(message.text),
-  error: (message) => say(message.text, "error", 20),
-  kept: (message) => {
+  error(message) {
+    say(message.text, "error", 20);
+    judging(false);
+    // What was refused does not stay in its field.
+    if (live.scene) fillFields(live.scene);
+  },
+  kept(message) {
     say(`kept: ${message.file}`);
+    judging(message.judged);
     element("verdict").replaceChildren(text("p", "judge it again with"), text("code", message.command));
+    if (message.objection) element("verdict").append(text("p", message.objection, "fail"));
+    if (message.judged) element("verdict").append(text("p", "the backend is judged …"));
   },
   verdict: showVerdict,
 };
@@ -98,18 +106,36 @@ function put(input, value) {
   if (document.activeElement !== input) input.value = value;
 }
 
+function judging(under_way) {
+  for (const id of ["keep", "judge"]) element(id).disabled = under_way;
+}
+
 function showScene(message) {
-  if (live.scene && live.scene.particles !== message.particles) past.clear();
+  if (live.scene && live.scene.particles !== message.particles) {
+    past.clear();
+    live.scores = null;
+  }
   live.scene = message;
   element("name").textContent = message.name;
   document.title = `${message.name} · decant live`;
   view.setScene(message);
+  if (past.pictures.length) past.present();
+  fillFields(message);
+  put(element("text"), message.text);
+  element("backends").replaceChildren(...message.backends.map((one) => Object.assign(document.createElement("option"), { value: one })));
+  element("device").textContent = `${message.backend} on ${message.device} (${message.executor}, ${message.precision}); `
+    + `${message.particles.toLocaleString("en")} fluid and ${message.wall_particles.toLocaleString("en")} wall particles`;
+  showTilts(message);
+  for (const warning of message.warnings) if (!live.warned.has(warning)) say(warning, "warning");
+  live.warned = new Set(message.warnings);
+}
+
+function fillFields(message) {
   message.gravity.forEach((g, k) => put(element(["gx", "gy", "gz"][k]), g));
   put(element("viscosity"), message.viscosity);
   put(element("sound"), message.sound_speed);
-  put(element("spacing"), message.spacing);
+  put(element("spacing"), Number(message.spacing.toPrecision(6)));
   put(element("particles"), message.particles);
-  put(element("text"), message.text);
   const [name, ...options] = message.backend.split(":");
   const listed = Object.fromEntries(options.map((one) => one.split("=")));
   const plugin = name === "plugin" || name === "python";
@@ -118,9 +144,6 @@ function showScene(message) {
   put(element("rebuild"), plugin ? "" : listed.rebuild ?? "");
   put(element("skin"), plugin ? "" : listed.skin ?? "");
   element("lists").hidden = name !== "list";
-  element("backends").replaceChildren(...message.backends.map((one) => Object.assign(document.createElement("option"), { value: one })));
-  element("device").textContent = `${message.backend} on ${message.device} (${message.executor}, ${message.precision}); `
-    + `${message.particles.toLocaleString("en")} fluid and ${message.wall_particles.toLocaleString("en")} wall particles`;
   element("levels").replaceChildren(...message.levels.map(({ fill, container, level }) => {
     const label = text("label", `level in ${container}, m `);
     const input = Object.assign(document.createElement("input"), { value: level, size: 9, id: `level-${fill}` });
@@ -128,17 +151,14 @@ function showScene(message) {
     label.append(input);
     return label;
   }));
-  showTilts(message);
-  for (const warning of message.warnings) if (!live.warned.has(warning)) say(warning, "warning");
-  live.warned = new Set(message.warnings);
 }
 
 function showTilts(message) {
   const tilting = message.containers.filter((one) => one.tilts);
-  const names = tilting.map((one) => one.name).join("\n");
+  const now = JSON.stringify(tilting.map((one) => [one.name, one.degrees, one.hand_degrees_per_second]));
   element("tilts").hidden = tilting.length === 0;
-  if (names === live.tilting) return;
-  live.tilting = names;
+  if (now === live.tilting) return;
+  live.tilting = now;
   element("tilts").replaceChildren(text("h2", "Tilt"), ...tilting.map((container) => {
     const block = document.createElement("div");
     const label = text("label", `${container.name} `);
@@ -148,11 +168,10 @@ function showTilts(message) {
     const schedule = Object.assign(text("button", "as scheduled"), { id: `schedule-${container.name}` });
     slider.addEventListener("input", () => tilt(container, Number(slider.value)));
     schedule.addEventListener("click", () => {
-      delete live.hand[container.name];
       ask("schedule", { container: container.name });
     });
     label.append(slider, angle);
-    block.append(label, schedule, text("p", `or drag it; turns at ${container.hand_degrees_per_second.toFixed(0)}°/s of the scene's time`));
+    block.append(label, schedule, text("p", `or drag it; turns at ${container.hand_degrees_per_second.toPrecision(2)}°/s of the scene's time`));
     container.slider = slider;
     container.angle = angle;
     container.schedule = schedule;
@@ -165,13 +184,12 @@ let asked = 0, latest = null;
 /** Not more often than the run can follow. */
 function tilt(container, degrees) {
   const [least, largest] = container.degrees;
-  live.hand[container.name] = Math.min(largest, Math.max(least, degrees));
-  latest = container.name;
+  latest = { container: container.name, degrees: Math.min(largest, Math.max(least, degrees)) };
   if (asked) return;
   const send = () => {
     asked = 0;
     if (latest === null) return;
-    ask("tilt", { container: latest, degrees: live.hand[latest] });
+    ask("tilt", latest);
     latest = null;
     asked = setTimeout(send, 60);
   };
@@ -191,10 +209,10 @@ function showStatus(message) {
   element("pause").textContent = message.paused ? "go on" : "pause";
   put(element("speed"), String(message.speed));
   for (const container of live.tilts ?? []) {
-    const degrees = message.degrees[container.name], by_hand = message.by_hand.includes(container.name);
-    if (document.activeElement !== container.slider) container.slider.value = by_hand ? live.hand[container.name] ?? degrees : degrees;
-    container.angle.textContent = `${degrees.toFixed(1)}°`;
-    container.schedule.disabled = !by_hand;
+    const degrees = message.degrees[container.name], target = message.by_hand[container.name];
+    if (document.activeElement !== container.slider) container.slider.value = target ?? degrees;
+    container.angle.textContent = `${degrees.toFixed(1)}°` + (target !== undefined && Math.abs(target - degrees) > 0.1 ? ` → ${target.toFixed(0)}°` : "");
+    container.schedule.disabled = target === undefined;
   }
   curves.add(message);
 }
@@ -222,6 +240,8 @@ function showVerdict(message) {
     why.append(Object.assign(text("td", `${worst.field}: ${worst.reason ?? ""}`, "why"), { colSpan: 3 }));
     table.append(why);
   }
+  judging(false);
+  element("verdict").lastChild.remove();
   element("verdict").append(text("p", `${message.rows.length} rows: ${message.verdict}`, message.verdict), table);
   element("verdict").dataset.verdict = message.verdict;
   say(`${message.file}: ${message.verdict}`, message.verdict === "pass" ? "" : "error");
@@ -258,7 +278,7 @@ function legend(picture, quantity) {
 function number(input) {
   const value = Number(input.value.trim());
   if (input.value.trim() !== "" && Number.isFinite(value)) return value;
-  say(`${input.closest("label").firstChild.textContent.trim()}: ${JSON.stringify(input.value)} is no number`, "error");
+  tell.error({ text: `${input.closest("label").firstChild.textContent.trim()}: ${JSON.stringify(input.value)} is no number` });
   return null;
 }
 
@@ -274,7 +294,6 @@ function on(id, event, action) {
 on("pause", "click", () => ask(live.status?.paused ? "go_on" : "pause"));
 on("step", "click", () => ask("step"));
 on("reset", "click", () => {
-  live.hand = {};
   curves.clear();
   past.clear();
   ask("reset");
@@ -307,11 +326,15 @@ for (const id of ["backend", "rebuild", "skin"])
     ask("backend", { choice: name + options.join("") });
   });
 on("apply", "click", () => ask("scene", { text: element("text").value }));
-on("keep", "click", () => ask("keep"));
-on("judge", "click", () => {
-  delete element("verdict").dataset.verdict;
-  ask("judge");
-});
+for (const what of ["keep", "judge"])
+  on(what, "click", () => {
+    delete element("verdict").dataset.verdict;
+    element("verdict").replaceChildren(text("p", "the oracle evaluates the instant …"));
+    judging(true);
+    ask(what);
+  });
+// What has been typed is done with: its field shows the run's value again.
+document.querySelector("aside").addEventListener("change", (event) => event.target.tagName === "INPUT" && event.target.blur());
 document.addEventListener("keydown", (event) => {
   if (/^(INPUT|TEXTAREA|SELECT|BUTTON)$/.test(event.target.tagName) || event.ctrlKey || event.metaKey) return;
   if (event.key === " ") {

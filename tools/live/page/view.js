@@ -42,6 +42,7 @@ class View {
     this.containers = [];
     this.palettes = Object.fromEntries(Object.entries(GRADIENTS).map(([name, colors]) => [name, palette(colors, true)]));
     this.palettes.region = palette(REGION_COLORS, false);
+    this.palettes.unknown = palette(["#808a96"], false);
     this.material = new THREE.RawShaderMaterial({
       uniforms: {
         least: { value: new THREE.Vector3() }, extent: { value: new THREE.Vector3() },
@@ -87,7 +88,13 @@ class View {
 
   /** Containers, floor and domain of another scene; the camera stays where the scene's room is the same. */
   setScene(scene) {
-    for (const one of this.containers) this.scene.remove(one);
+    for (const group of this.containers) {
+      this.scene.remove(group);
+      for (const one of group.children) {
+        one.geometry.dispose();
+        one.material.dispose();
+      }
+    }
     this.containers = scene.containers.map((container) => {
       const group = new THREE.Group();
       group.matrixAutoUpdate = false;
@@ -190,18 +197,19 @@ class View {
       const [hit] = ray.intersectObjects(meshes);
       return hit && hit.object.userData;
     };
-    let held = null, last = 0;
+    let held = null, pressed = 0, moved = false;
     this.canvas.addEventListener("pointermove", (event) => {
       if (!held) {
         if (!event.buttons) this.canvas.style.cursor = cupAt(event) ? "ew-resize" : "";
         return;
       }
-      onDragCup(held, 0.5 * (event.clientX - last));
-      last = event.clientX;
+      onDragCup(held, 0.5 * (event.clientX - pressed), !moved);
+      moved = true;
     });
     this.canvas.addEventListener("pointerdown", (event) => {
       held = event.button === 0 && !event.shiftKey ? cupAt(event) : null;
-      last = event.clientX;
+      pressed = event.clientX;
+      moved = false;
       this.controls.enabled = !held;
       if (held) this.canvas.setPointerCapture(event.pointerId);
     }, true);
