@@ -31,11 +31,11 @@ class Checks {
  public:
   Checks(const Scene& scene, const std::string& file) : scene_(scene), file_(file) {}
 
-  std::vector<std::string> run() {
+  std::vector<std::string> run(Distances distances) {
     resolution();
     domain();
     for (std::size_t i = 0; i < scene_.containers.size(); ++i) container(i);
-    for (std::size_t i = 0; i < scene_.containers.size(); ++i)
+    for (std::size_t i = 0; i < scene_.containers.size() && distances == Distances::unknown; ++i)
       for (std::size_t j = 0; j < i; ++j) clearance(i, j);
     check_fluid(scene_, file_);
     time();
@@ -258,6 +258,8 @@ class Checks {
 
 }  // namespace
 
-std::vector<std::string> check_scene(const Scene& scene, const std::string& file) { return Checks(scene, file).run(); }
+std::vector<std::string> check_scene(const Scene& scene, const std::string& file, Distances distances) {
+  return Checks(scene, file).run(distances);
+}
 
 }  // namespace decant

@@ -31,7 +31,12 @@ int substeps_for(const Scene& scene);
 /// is unchecked: call check_scene. Throws InputError.
 Scene with_particles(Scene scene, std::int64_t particles);
 
+/// What was checked before: containers that are as they were, and move as they did, keep their distances, whatever
+/// became of the fluid. To look for the least one takes seconds where boxes turn.
+enum class Distances { unknown, known };
+
 /// Throws InputError on the first violated condition; returns warnings. \param file for messages.
-std::vector<std::string> check_scene(const Scene& scene, const std::string& file);
+std::vector<std::string> check_scene(const Scene& scene, const std::string& file,
+                                     Distances distances = Distances::unknown);
 
 }  // namespace decant

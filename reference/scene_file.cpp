@@ -284,14 +284,15 @@ Scene load_scene(const std::filesystem::path& file, std::vector<std::string>* wa
   return complete_scene({std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()}, name, warnings);
 }
 
-Scene complete_scene(const std::string& text, const std::string& name, std::vector<std::string>* warnings) {
+Scene complete_scene(const std::string& text, const std::string& name, std::vector<std::string>* warnings,
+                     Distances distances) {
   Scene scene = parse_scene(text, name);
   try {
     if (scene.schedule.substeps_derived) scene.schedule.substeps_per_frame = substeps_for(scene);
   } catch (const InputError& error) {
     throw InputError(name, error.key(), error.value(), error.bound());
   }
-  auto found = check_scene(scene, name);
+  auto found = check_scene(scene, name, distances);
   if (warnings) *warnings = std::move(found);
   return scene;
 }

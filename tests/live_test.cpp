@@ -183,6 +183,15 @@ TEST(LiveScene, RefusesByTheScenesOwnRulesAndStaysAsItWas) {
   EXPECT_EQ(substep, 700);
 }
 
+TEST(LiveScene, LooksForDistancesOfContainersAgainOnlyWhereTheyMayHaveChanged) {
+  LiveScene scene = cups();
+  std::int64_t substep = 0;
+  // The cups stand apart by more than H as it is, and not where the source is lowered.
+  EXPECT_THROW(scene.set("/containers/0/origin", {-0.03, 0, 0.03}, substep), InputError);
+  EXPECT_EQ(scene.set("/gravity", {0, 0, -5.0}, substep), LiveScene::Outcome::goes_on);
+  EXPECT_EQ(scene.set("/containers/0/origin", {-0.066, 0, 0.092}, substep), LiveScene::Outcome::restarts);
+}
+
 TEST(LiveScene, ShortensTheSubstepByAWholeNumberAtTheSameTime) {
   LiveScene scene = cups();
   std::int64_t substep = 701;

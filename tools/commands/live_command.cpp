@@ -64,7 +64,7 @@ Start start_of(const std::string& file) {
     // Where the rules of this build give another substep, the recording's number would mean another time.
     if (fixture.scene.schedule.substeps_derived && substeps_for(fixture.scene) != substeps)
       fixture.scene.schedule.substeps_derived = false;
-    return {live::LiveScene(scene_to_json(fixture.scene), file), std::move(fixture.state)};
+    return {live::LiveScene(scene_to_json(fixture.scene), file, Distances::known), std::move(fixture.state)};
   }
   (void)load_scene(file);  // refuses what cannot be read, as other verbs do
   std::ifstream in(file, std::ios::binary);

@@ -4,7 +4,6 @@
 
 #include "reference/error.hpp"
 #include "reference/pose.hpp"
-#include "reference/scene_checks.hpp"
 #include "reference/scene_file.hpp"
 #include "reference/scene_json_reader.hpp"
 
@@ -54,11 +53,13 @@ double reach(const Container& container) {
 
 }  // namespace
 
-LiveScene::LiveScene(const std::string& text, std::string file) : file_(std::move(file)) { replace(text); }
+LiveScene::LiveScene(const std::string& text, std::string file, Distances distances) : file_(std::move(file)) {
+  replace(text, distances);
+}
 
-LiveScene::Parsed LiveScene::parse(const ordered_json& json) const {
+LiveScene::Parsed LiveScene::parse(const ordered_json& json, Distances distances) const {
   Parsed parsed;
-  parsed.scene = complete_scene(json.dump(), file_, &parsed.warnings);
+  parsed.scene = complete_scene(json.dump(), file_, &parsed.warnings, distances);
   return parsed;
 }
 
@@ -83,9 +84,9 @@ std::map<std::string, double> LiveScene::hand_targets() const {
   return targets;
 }
 
-void LiveScene::replace(const std::string& text) {
+void LiveScene::replace(const std::string& text, Distances distances) {
   ordered_json json = parse_text(text, file_);
-  Parsed parsed = parse(json);
+  Parsed parsed = parse(json, distances);
   take(std::move(json), std::move(parsed));
   restart();
 }
@@ -115,8 +116,8 @@ LiveScene::Outcome LiveScene::set(const std::string& pointer, const ordered_json
   } catch (const ordered_json::exception&) {
     throw InputError(file_, pointer, value.dump(), "no such place in this scene");
   }
-  Parsed parsed = parse(json);
   const bool goes_on = std::ranges::any_of(goes_on_with, [&](const char* one) { return pointer.starts_with(one); });
+  Parsed parsed = parse(json, goes_on ? Distances::known : Distances::unknown);
   take(std::move(json), std::move(parsed));
   if (!goes_on) {
     restart();

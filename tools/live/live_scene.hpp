@@ -4,6 +4,7 @@
 #pragma once
 
 #include "reference/scene.hpp"
+#include "reference/scene_checks.hpp"
 #include "reference/state.hpp"
 
 #include <nlohmann/json.hpp>
@@ -17,8 +18,9 @@ namespace decant::live {
 
 class LiveScene {
  public:
-  /// \param text  of a scene file; \param file  its name for messages. Throws InputError.
-  LiveScene(const std::string& text, std::string file);
+  /// \param text  of a scene file; \param file  its name for messages; \param distances  known of a recording's
+  /// scene. Throws InputError.
+  LiveScene(const std::string& text, std::string file, Distances distances = Distances::unknown);
 
   /// The scene that runs, its cups where hands have them.
   const Scene& running() const { return running_; }
@@ -35,7 +37,7 @@ class LiveScene {
   /// \param pointer  JSON pointer into the scene file: "/gravity", "/fluid/viscosity"
   Outcome set(const std::string& pointer, const nlohmann::ordered_json& value, std::int64_t& substep);
   /// Another scene. Throws InputError, and nothing is changed.
-  void replace(const std::string& text);
+  void replace(const std::string& text) { replace(text, Distances::unknown); }
   /// As many particles. Throws InputError, and nothing is changed.
   void set_particles(std::int64_t particles);
   /// As it was at first: no hand, and no substep shorter than a frame's number of them needs to be a multiple of this.
@@ -71,7 +73,8 @@ class LiveScene {
     Scene scene;
     std::vector<std::string> warnings;
   };
-  Parsed parse(const nlohmann::ordered_json& json) const;
+  void replace(const std::string& text, Distances distances);
+  Parsed parse(const nlohmann::ordered_json& json, Distances distances = Distances::unknown) const;
   void take(nlohmann::ordered_json json, Parsed parsed);
   Container& running_container(const std::string& name);
   double scheduled(const std::string& container, std::int64_t substep) const;
