@@ -45,7 +45,7 @@ TEST(Command, HelpOfEveryVerbFitsTheTerminalAndHasAnExample) {
     if (word == "decant") break;
     if (!word.empty()) verbs.push_back(word);
   }
-  EXPECT_EQ(verbs.size(), 11);
+  EXPECT_EQ(verbs.size(), 12);
   for (const std::string& verb : verbs) {
     const test::ShellOutput help = answer_to(verb + " --help");
     EXPECT_EQ(help.status, 0) << verb;

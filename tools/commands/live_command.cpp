@@ -41,8 +41,9 @@ struct LiveArguments {
 };
 
 constexpr const char* live_footer =
-    "Prints the page's address and serves it on the loopback address until Ctrl-C. From another machine:\n"
+    "Prints the page's address and serves it on the loopback address until Ctrl-C. From another machine,\n"
     "ssh -N -L PORT:127.0.0.1:PORT HOST, then the same address there.\n"
+    "\n"
     "The page tilts cups, changes gravity, viscosity, spacing, fill, backend and its options, looks back,\n"
     "and draws scores against the oracle. \"keep this\" saves the instant as a recording into --keep;\n"
     "\"judge this\" runs conform on it.\n"
