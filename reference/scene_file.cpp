@@ -275,13 +275,16 @@ Scene parse_scene(std::string_view text, const std::string& file) {
   return scene;
 }
 
-Scene load_scene(const std::filesystem::path& file, std::vector<std::string>* warnings) {
-  const std::string name = file.string();
+std::string read_scene_text(const std::filesystem::path& file) {
   std::error_code ignored;
   std::ifstream in(file, std::ios::binary);
   if (std::filesystem::is_directory(file, ignored) || !in)
-    throw InputError(name, "(whole file)", "not readable", "a scene file");
-  return complete_scene({std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()}, name, warnings);
+    throw InputError(file.string(), "(whole file)", "not readable", "a scene file");
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+Scene load_scene(const std::filesystem::path& file, std::vector<std::string>* warnings) {
+  return complete_scene(read_scene_text(file), file.string(), warnings);
 }
 
 Scene complete_scene(const std::string& text, const std::string& name, std::vector<std::string>* warnings,

@@ -17,6 +17,9 @@ namespace decant {
 /// \param text  JSON, // and /* */ comments allowed; \param file  the name for messages
 Scene parse_scene(std::string_view text, const std::string& file);
 
+/// The text of a scene file. Throws InputError where it cannot be read.
+std::string read_scene_text(const std::filesystem::path& file);
+
 /// Reads, parses and checks (scene_checks.hpp) a scene file; derives the substeps of a frame
 /// unless the file sets them. Throws InputError; warnings go to `warnings` where one is given.
 Scene load_scene(const std::filesystem::path& file, std::vector<std::string>* warnings = nullptr);

@@ -7,7 +7,6 @@
 #include "tools/commands/backend_choice.hpp"
 #include "tools/commands/commands.hpp"
 #include "tools/commands/output_place.hpp"
-#include "tools/commands/particles_option.hpp"
 #include "tools/common/stop_signal.hpp"
 #include "tools/live/run.hpp"
 #include "tools/live/server.hpp"
@@ -20,8 +19,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <memory>
 #include <optional>
 #include <stop_token>
@@ -67,9 +64,7 @@ Start start_of(const std::string& file) {
       fixture.scene.schedule.substeps_derived = false;
     return {live::LiveScene(scene_to_json(fixture.scene), file, Distances::known), std::move(fixture.state)};
   }
-  (void)load_scene(file);  // refuses what cannot be read, as other verbs do
-  std::ifstream in(file, std::ios::binary);
-  return {live::LiveScene({std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()}, file), std::nullopt};
+  return {live::LiveScene(read_scene_text(file), file), std::nullopt};
 }
 
 /// Ends the server before the run that its pages ask.
@@ -119,7 +114,6 @@ int run(LiveArguments& arguments) {
   options.keep = arguments.keep;
   options.pictures_per_second = arguments.pictures;
   options.paused = arguments.paused;
-
   options.executor = arguments.executor;
 
   const StopSignal signal;

@@ -181,21 +181,6 @@ void advance_to(std::int64_t target, std::int64_t& now, const Scene& scene, Back
   }
 }
 
-std::map<std::string, std::string> provenance_of(const RecordArguments& arguments, const BackendInfo& info,
-                                                 const Start& start) {
-  auto provenance = build_provenance();
-  provenance.insert({
-      {"scene_file", std::filesystem::path(arguments.scene).filename().string()},
-      {"started_from", start.origin},
-      {"advanced_by", info.name},
-      {"advanced_options", info.options},
-      {"advanced_executor", info.executor},
-      {"advanced_device", info.device},
-      {"advanced_precision", info.precision},
-  });
-  return provenance;
-}
-
 int record(const RecordArguments& arguments) {
   const Scene scene = load_scene(arguments.scene);
   const Start start = start_of(arguments, scene);
@@ -234,7 +219,8 @@ int record(const RecordArguments& arguments) {
         record_answer(fixture, arguments.ensemble_substeps, arguments.ensemble_members);
     const auto beyond = beyond_limits(scene, fixture.state, fixture.fields->density);
     if (arguments.sample) reduce_to_sample(fixture);
-    fixture.provenance = provenance_of(arguments, info, start);
+    fixture.provenance = recording_provenance(info, start.origin);
+    fixture.provenance["scene_file"] = std::filesystem::path(arguments.scene).filename().string();
     if (!beyond.empty()) fixture.provenance["limits_exceeded"] = fmt::format("{}", fmt::join(beyond, "; "));
     // Recorded anew from a fixture as it is: what brought the fluid there stays true.
     if (phase.substep == start.state.substep)

@@ -5,6 +5,7 @@
 #include "oracle/checks/conform.hpp"
 #include "reference/error.hpp"
 #include "reference/sampling.hpp"
+#include "tools/common/build_provenance.hpp"
 
 namespace decant {
 
@@ -15,6 +16,19 @@ std::string record_answer(Fixture& fixture, std::int64_t ensemble_substeps, std:
   fixture.ensemble =
       run_ensemble(fixture.scene, sample_walls(fixture.scene), fixture.state, ensemble_substeps, ensemble_members);
   return ill_posed_reason;
+}
+
+std::map<std::string, std::string> recording_provenance(const BackendInfo& info, const std::string& started_from) {
+  auto provenance = build_provenance();
+  provenance.insert({
+      {"started_from", started_from},
+      {"advanced_by", info.name},
+      {"advanced_options", info.options},
+      {"advanced_executor", info.executor},
+      {"advanced_device", info.device},
+      {"advanced_precision", info.precision},
+  });
+  return provenance;
 }
 
 Fixture with_kernel(Fixture fixture, KernelFamily kernel) {

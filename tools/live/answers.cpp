@@ -23,8 +23,6 @@ Quantity quantity_of(const std::string& name) {
   return static_cast<Quantity>(found - quantity_names.begin());
 }
 
-bool finite(const ParticleState& state) { return pour::all_finite(state.position) && pour::all_finite(state.velocity); }
-
 }  // namespace
 
 void Run::Implementation::ask(std::string json) {
@@ -194,7 +192,7 @@ void Run::Implementation::fail(const std::string& why) {
 ParticleState Run::Implementation::state_now() {
   ParticleState state;
   if (failed_.empty()) backend_->read(state);
-  if (!failed_.empty() || !finite(state)) return *last_;
+  if (!failed_.empty() || !pour::all_finite(state)) return *last_;
   state.substep = substep_;
   return state;
 }

@@ -5,7 +5,6 @@
 #include "oracle/checks/conform.hpp"
 #include "oracle/files/fixture_file.hpp"
 #include "oracle/report/report.hpp"
-#include "tools/common/build_provenance.hpp"
 #include "tools/common/recording.hpp"
 
 #include <fmt/format.h>
@@ -25,13 +24,7 @@ Kept keep_instant(const Instant& instant, const fs::path& folder) {
   // As long and as many as `decant record` has them, or the fewest: two clicks do not wait for hours.
   const std::string why = record_answer(fixture, sample ? 1 : 32, sample ? 2 : 24);
   if (sample) reduce_to_sample(fixture);
-  fixture.provenance = build_provenance();
-  fixture.provenance.insert({{"started_from", "an instant of decant live"},
-                             {"advanced_by", instant.info.name},
-                             {"advanced_options", instant.info.options},
-                             {"advanced_executor", instant.info.executor},
-                             {"advanced_device", instant.info.device},
-                             {"advanced_precision", instant.info.precision}});
+  fixture.provenance = recording_provenance(instant.info, "an instant of decant live");
   fs::create_directories(folder);
   const std::string stem =
       fmt::format("{}-live-{}", instant.scene.name.empty() ? "scene" : instant.scene.name, instant.state.substep);

@@ -5,7 +5,6 @@
 #include "reference/error.hpp"
 #include "reference/pose.hpp"
 #include "reference/scene_file.hpp"
-#include "reference/scene_json_reader.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -26,11 +25,6 @@ constexpr double degree = std::numbers::pi / 180;
 /// What may change under a fluid that moves: forces, not which particles there are.
 constexpr std::array<const char*, 6> goes_on_with = {
     "/gravity", "/fluid/viscosity", "/fluid/wall_viscosity", "/fluid/sound_speed", "/fluid/allow_tension", "/contact"};
-
-ordered_json parse_text(const std::string& text, const std::string& file) {
-  (void)parse_scene(text, file);  // says line and column of what is no JSON
-  return ordered_json::parse(text, nullptr, true, true);
-}
 
 /// How far a container's points are from its tilt's line at most, m, or from its origin.
 double reach(const Container& container) {
@@ -57,9 +51,9 @@ LiveScene::LiveScene(const std::string& text, std::string file, Distances distan
   replace(text, distances);
 }
 
-LiveScene::Parsed LiveScene::parse(const ordered_json& json, Distances distances) const {
+LiveScene::Parsed LiveScene::parse(const std::string& text, Distances distances) const {
   Parsed parsed;
-  parsed.scene = complete_scene(json.dump(), file_, &parsed.warnings, distances);
+  parsed.scene = complete_scene(text, file_, &parsed.warnings, distances);
   return parsed;
 }
 
@@ -85,9 +79,8 @@ std::map<std::string, double> LiveScene::hand_targets() const {
 }
 
 void LiveScene::replace(const std::string& text, Distances distances) {
-  ordered_json json = parse_text(text, file_);
-  Parsed parsed = parse(json, distances);
-  take(std::move(json), std::move(parsed));
+  Parsed parsed = parse(text, distances);  // says line and column of what is no JSON
+  take(ordered_json::parse(text, nullptr, true, true), std::move(parsed));
   restart();
 }
 
@@ -101,7 +94,7 @@ void LiveScene::set_particles(std::int64_t particles) {
                      fmt::format("must be 1 … {}, which this machine's memory holds", most));
   ordered_json json = json_;
   json["particle_spacing"] = with_particles(given_, particles).particle_spacing;
-  Parsed parsed = parse(json);
+  Parsed parsed = parse(json.dump());
   take(std::move(json), std::move(parsed));
   restart();
 }
@@ -117,7 +110,7 @@ LiveScene::Outcome LiveScene::set(const std::string& pointer, const ordered_json
     throw InputError(file_, pointer, value.dump(), "no such place in this scene");
   }
   const bool goes_on = std::ranges::any_of(goes_on_with, [&](const char* one) { return pointer.starts_with(one); });
-  Parsed parsed = parse(json, goes_on ? Distances::known : Distances::unknown);
+  Parsed parsed = parse(json.dump(), goes_on ? Distances::known : Distances::unknown);
   take(std::move(json), std::move(parsed));
   if (!goes_on) {
     restart();
@@ -149,9 +142,12 @@ Container& LiveScene::running_container(const std::string& name) {
   return *found;
 }
 
+const Tilt& LiveScene::schedule(const std::string& container) const {
+  return *std::ranges::find(given_.containers, container, &Container::name)->tilt;
+}
+
 double LiveScene::scheduled(const std::string& container, std::int64_t substep) const {
-  const auto found = std::ranges::find_if(given_.containers, [&](const Container& c) { return c.name == container; });
-  return tilt_at(*found->tilt, running_.time_at(substep)).angle;
+  return tilt_at(schedule(container), running_.time_at(substep)).angle;
 }
 
 /// From where the container is now: at a constant rate towards the target, or at rest.
@@ -205,9 +201,7 @@ bool LiveScene::arrive(std::int64_t substep) {
     if (hand.to_schedule) {
       const double target = scheduled(name, substep);
       if (std::abs(target - angle) <= width) {
-        const auto given =
-            std::ranges::find_if(given_.containers, [&, n = name](const Container& c) { return c.name == n; });
-        container.tilt = given->tilt;
+        container.tilt = schedule(name);
         hands_.erase(name);
       } else {
         turn(name, {target, true, false}, substep);
@@ -215,7 +209,6 @@ bool LiveScene::arrive(std::int64_t substep) {
       changed = true;
     } else if (hand.moving && (passed || std::abs(hand.target - angle) <= width)) {
       turn(name, {angle, false, false}, substep);
-      hands_[name].moving = false;
       changed = true;
     }
   }

@@ -26,7 +26,6 @@ class LiveScene {
   const Scene& running() const { return running_; }
   /// The scene as the user has it, without what was moved by hand: JSON that a file may hold.
   std::string text() const { return json_.dump(2); }
-  const nlohmann::ordered_json& json() const { return json_; }
   const std::vector<std::string>& warnings() const { return warnings_; }
 
   /// What becomes of a run whose scene is changed.
@@ -74,9 +73,11 @@ class LiveScene {
     std::vector<std::string> warnings;
   };
   void replace(const std::string& text, Distances distances);
-  Parsed parse(const nlohmann::ordered_json& json, Distances distances = Distances::unknown) const;
+  Parsed parse(const std::string& text, Distances distances = Distances::unknown) const;
   void take(nlohmann::ordered_json json, Parsed parsed);
   Container& running_container(const std::string& name);
+  /// Of a container that can tilt, without hands.
+  const Tilt& schedule(const std::string& container) const;
   double scheduled(const std::string& container, std::int64_t substep) const;
   void turn(const std::string& container, Hand hand, std::int64_t substep);
 

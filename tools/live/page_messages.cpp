@@ -3,7 +3,6 @@
 #include "tools/live/page_messages.hpp"
 
 #include "reference/pose.hpp"
-#include "reference/scene_checks.hpp"
 #include "reference/scene_limits.hpp"
 
 #include <fmt/format.h>
@@ -58,16 +57,12 @@ ordered_json scene_message(const LiveScene& live, Eigen::Index particles, Eigen:
                       {"particles", particles},
                       {"wall_particles", wall_particles},
                       {"spacing", scene.particle_spacing},
-                      {"time_step", scene.time_step()},
-                      {"end", scene.schedule.end},
-                      {"rest_density", scene.fluid.rest_density},
                       {"min", vector_json(scene.domain.min)},
                       {"max", vector_json(scene.domain.max)},
                       {"floor", scene.floor ? ordered_json(scene.floor->height) : ordered_json()},
                       {"gravity", vector_json(scene.gravity)},
                       {"viscosity", scene.fluid.viscosity},
                       {"sound_speed", scene.fluid.sound_speed},
-                      {"expected_speed", expected_max_speed(scene)},
                       {"backend", choice},
                       {"backends", backends},
                       {"device", info.device},

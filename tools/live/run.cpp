@@ -19,13 +19,7 @@ constexpr double share_of_pictures = 0.07, slowest_interval = 0.15;
 // s, between two figures of the status.
 constexpr double status_interval = 0.25;
 
-StageTimes operator-(StageTimes a, const StageTimes& b) {
-  for (const auto& [name, stage] : pour::stage_names) {
-    (a.*stage).seconds -= (b.*stage).seconds;
-    (a.*stage).calls -= (b.*stage).calls;
-  }
-  return a;
-}
+using pour::operator-;
 
 /// N of lists rebuilt every N substeps; else 1.
 std::int64_t rebuild_interval(const std::string& choice) {

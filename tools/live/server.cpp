@@ -15,7 +15,6 @@
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
 
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <deque>
@@ -76,6 +75,7 @@ class Server::Implementation {
   void tell(const std::string& type, Message text);
   void join(const std::shared_ptr<Page>& page);
   void leave(const std::shared_ptr<Page>& page);
+  asio::io_context& loop() { return loop_; }
   /// Pages that look, and those among them that have drawn the picture before.
   void count();
 
@@ -92,9 +92,6 @@ class Server::Implementation {
   std::map<std::string, Message> last_;  // told, by type; for who comes later
   Message last_picture_;
   std::thread thread_;
-
- public:
-  asio::io_context& loop() { return loop_; }
 };
 
 /// A connection: requests one after another, and a socket in the end.

@@ -38,8 +38,6 @@ namespace decant::pour {
 namespace fs = std::filesystem;
 namespace {
 
-bool finite(const ParticleState& state) { return all_finite(state.position) && all_finite(state.velocity); }
-
 class Pour {
  public:
   Pour(const Scene& scene, Backend& backend, const Options& options)
@@ -272,7 +270,7 @@ void Pour::next_segment() {
     seconds = seconds_since(before);
     if (!advanced.ok()) return;
     backend_.read(*next);
-    next_finite = finite(*next);
+    next_finite = all_finite(*next);
     if (whole && next_finite) evaluated = backend_.evaluate_density(fields);
     reading = seconds_since(before) - seconds;
   });

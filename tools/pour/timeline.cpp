@@ -97,6 +97,15 @@ StageTimes operator+(const StageTimes& a, const StageTimes& b) {
   return sum;
 }
 
+StageTimes operator-(const StageTimes& now, const StageTimes& before) {
+  StageTimes since = now;
+  for (const StageName& s : stage_names) {
+    (since.*s.stage).seconds -= (before.*s.stage).seconds;
+    (since.*s.stage).calls -= (before.*s.stage).calls;
+  }
+  return since;
+}
+
 void Timeline::write(Hdf5Writer& out, const std::string& group) const {
   for (const RealColumn& c : real_columns)
     out.vector(group + "/" + c.name, column<Eigen::VectorXd>(rows, [&](const TimelineRow& r) { return r.*c.member; }),

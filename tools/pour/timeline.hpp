@@ -39,6 +39,8 @@ bool all_finite(const Values& values) {
   return (values - values).sum() == 0.0;
 }
 
+inline bool all_finite(const ParticleState& state) { return all_finite(state.position) && all_finite(state.velocity); }
+
 /// Throws BackendError naming the particle where a density or a pressure is not finite.
 void require_finite(const Fields& fields, std::int64_t substep);
 
@@ -48,6 +50,8 @@ TimelineRow timeline_row(std::int64_t frame, const Scene& scene, const ParticleS
 
 /// Wall times of one stage of the substep, added over sessions.
 StageTimes operator+(const StageTimes& a, const StageTimes& b);
+/// Those since an earlier moment.
+StageTimes operator-(const StageTimes& now, const StageTimes& before);
 
 /// Stage names and members, in the order they run.
 struct StageName {

@@ -19,9 +19,10 @@ from pathlib import Path
 import websocket
 
 from one_line import run_main
+from study_runs import run
 
 
-class Run:
+class Live:
     def __init__(self, command):
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
         self.address = self.process.stdout.readline().strip().replace("http", "ws") + "socket"
@@ -67,24 +68,24 @@ def rate(first, last):
 
 
 def measure(command, seconds, windows):
-    run = Run(command)
+    live = Live(command)
     rows, before = [], None
     try:
         for _ in range(windows):
-            unwatched = run.memory()
-            pictures, size, first, last = run.look(seconds)
-            memory = run.memory()
+            unwatched = live.memory()
+            pictures, size, first, last = live.look(seconds)
+            memory = live.memory()
             if before:
                 rows[-1]["unwatched"] = rate(before, first)
             rows.append({"watched": rate(first, last), "pictures": pictures, "memory": memory - unwatched})
             before = last
             time.sleep(seconds)
-        rows[-1]["unwatched"] = rate(before, run.look(0.1)[2])
+        rows[-1]["unwatched"] = rate(before, live.look(0.1)[2])
     finally:
-        run.end()
+        live.end()
     median = {key: statistics.median(row[key] for row in rows) for key in rows[0]}
-    return {"scene": run.scene["name"], "particles": run.scene["particles"], "backend": run.scene["backend"],
-            "device": run.scene["device"], "pictures_per_second": median["pictures"], "picture_bytes": size,
+    return {"scene": live.scene["name"], "particles": live.scene["particles"], "backend": live.scene["backend"],
+            "device": live.scene["device"], "pictures_per_second": median["pictures"], "picture_bytes": size,
             "substeps_per_second": median["unwatched"], "substeps_per_second_watched": median["watched"],
             "slower_percent": 100 * (1 - median["watched"] / median["unwatched"]),
             "more_memory_MB": max(row["memory"] for row in rows), "windows": rows}
@@ -105,7 +106,7 @@ def main():
         rows.append(measure([arguments.decant, "live", *arguments.scene, *size, "--quiet"], arguments.seconds,
                             arguments.windows))
         print({key: value for key, value in rows[-1].items() if key != "windows"}, flush=True)
-    info = json.loads(subprocess.run([arguments.decant, "info", "--json"], capture_output=True, text=True).stdout)
+    info = json.loads(run([arguments.decant, "info", "--json"]))
     arguments.out.write_text(json.dumps({"provenance": {"git_revision": info["git_revision"]}, "rows": rows}, indent=1))
     return 0
 
