@@ -2,7 +2,9 @@
 /// The table of backends, and the host side they share: scene data in, id-ordered Eigen data out.
 #include "gpu/backends.hpp"
 
-#include "gpu/solver/device_solver.hpp"
+#include "gpu/ranks/mpi_communicator.hpp"
+#include "gpu/ranks/nccl_exchange.hpp"
+#include "gpu/solver/rank_team.hpp"
 #include "reference/error.hpp"
 #include "reference/scene.hpp"
 #include "reference/state.hpp"
@@ -56,6 +58,23 @@ IdVector ids_of(const std::vector<std::int64_t>& ids) {
   return Eigen::Map<const IdVector>(ids.data(), static_cast<Eigen::Index>(ids.size()));
 }
 
+/// A solver of the table.
+std::unique_ptr<DeviceSolver> make_solver(const gpu::SolverChoice& choice) {
+  for (const Entry& entry : table) {
+    const auto make = choice.cuda ? entry.cuda : entry.host;
+    if (choice.backend == std::string_view(entry.name) && make) return make(choice.options);
+  }
+  throw BackendError(std::string(choice.backend) + ": not in this build");
+}
+
+/// Of the one ProcessRanks that there can be, as there is one MPI.
+std::weak_ptr<gpu::RankTeam>& process_team() {
+  static std::weak_ptr<gpu::RankTeam> team;
+  return team;
+}
+
+bool runs_on_ranks(std::string_view backend) { return backend == "hash" || backend == "list"; }
+
 class DeviceBackend : public Backend {
  public:
   DeviceBackend(std::string name, Executor executor, std::string options, std::unique_ptr<DeviceSolver> solver)
@@ -68,8 +87,15 @@ class DeviceBackend : public Backend {
   void load(const Scene& scene, const Walls& walls, const ParticleState& state) override {
     scene_ = scene;
     substep_ = state.substep;
-    gpu::Problem problem{gpu::make_constants(scene),           gpu::make_geometry(scene), gpu::make_region(scene),
-                         gpu::make_wall_samples(scene, walls), rows_of(state.position),   rows_of(state.velocity)};
+    gpu::Problem problem{gpu::make_constants(scene),
+                         gpu::make_geometry(scene),
+                         gpu::make_region(scene),
+                         gpu::make_wall_samples(scene, walls),
+                         rows_of(state.position),
+                         rows_of(state.velocity),
+                         0,
+                         {},
+                         {}};
     solver_->load(problem);
   }
 
@@ -132,6 +158,8 @@ class DeviceBackend : public Backend {
     stats.rebuilds = solver_->rebuilds();
     stats.verified = solver_->pair_totals();
     stats.device_bytes = static_cast<std::int64_t>(solver_->device_bytes());
+    const gpu::RankStatistics ranks = solver_->rank_statistics();
+    stats.ranks = {ranks.ghosts, ranks.refreshes, ranks.rebalances, ranks.largest_imbalance};
     return stats;
   }
 
@@ -151,6 +179,36 @@ class DeviceBackend : public Backend {
 };
 
 }  // namespace
+
+ProcessRanks::ProcessRanks() : others_(gpu::mpi_communicator()) {
+  if (!others_) return;
+#if DECANT_HAS_CUDA
+  gpu::cuda::use_device(gpu::rank_on_this_machine(*others_));
+#endif
+  if (others_->rank() != 0) return;
+  team_ = gpu::make_process_team(std::move(others_), make_solver);
+  process_team() = team_;
+}
+ProcessRanks::~ProcessRanks() = default;
+
+bool ProcessRanks::serve() {
+  if (!others_) return false;
+  gpu::RankSide(*others_, make_solver).serve();
+  return true;
+}
+
+int process_ranks() {
+  const auto team = process_team().lock();
+  return team ? team->size() : 1;
+}
+std::string mpi_version() { return gpu::mpi_version(); }
+std::string nccl_version() {
+#if DECANT_HAS_CUDA
+  return gpu::cuda::nccl_version();
+#else
+  return "none";
+#endif
+}
 
 std::vector<std::string> backend_names() {
   std::vector<std::string> names;
@@ -194,8 +252,17 @@ std::unique_ptr<Backend> make_backend(std::string_view name, Executor executor, 
     const gpu::SolverOptions parsed = gpu::parse_options(entry.name, options);
     std::string why_not;
     if (!executor_available(executor, &why_not)) throw BackendError("executor cuda: " + why_not);
-    const auto make = executor == Executor::host ? entry.host : entry.cuda;
-    return backend_around(entry.name, executor, options, make(parsed));
+    gpu::SolverChoice choice{{}, executor == Executor::cuda, parsed};
+    name.copy(choice.backend, sizeof choice.backend - 1);
+    auto team = runs_on_ranks(name) ? process_team().lock() : nullptr;
+    if (team && parsed.ranks != 1)
+      throw InputError("command line", "--backend", std::string(name) + ":" + options,
+                       "without ranks under mpirun, whose processes are the ranks");
+    if (parsed.ranks != 1) team = gpu::make_thread_team(parsed.ranks, make_solver);
+    std::string told = options;
+    if (team && parsed.ranks == 1) told += (told.empty() ? "ranks=" : ":ranks=") + std::to_string(team->size());
+    return backend_around(entry.name, executor, told,
+                          team ? make_on_ranks(std::move(team), choice) : make_solver(choice));
   }
   std::string known;
   for (const Entry& entry : table) known += (known.empty() ? "" : ", ") + std::string(entry.name);

@@ -12,10 +12,37 @@
 namespace decant {
 
 namespace gpu {
+class Communicator;
 class DeviceSolver;
-}
+class RankTeam;
+}  // namespace gpu
 
 enum class Executor { host, cuda };
+
+/// The processes that mpirun started with this one. While rank 0's lives, `hash` and `list` run on all of them.
+/// Where there is one process nothing changes.
+class ProcessRanks {
+ public:
+  /// Throws BackendError where the processes cannot find each other.
+  ProcessRanks();
+  /// The other ranks end with rank 0's.
+  ~ProcessRanks();
+  ProcessRanks(const ProcessRanks&) = delete;
+  ProcessRanks& operator=(const ProcessRanks&) = delete;
+
+  /// Of a rank that is not 0: does what rank 0 asks until that ends, and then returns true. False elsewhere.
+  bool serve();
+
+ private:
+  std::unique_ptr<gpu::Communicator> others_;
+  std::shared_ptr<gpu::RankTeam> team_;
+};
+
+/// How many processes run `hash` and `list`; 1 without mpirun.
+int process_ranks();
+/// "Open MPI 4.1.4" and "2.28.3", or "none".
+std::string mpi_version();
+std::string nccl_version();
 
 /// Names in the table: "brute", …
 std::vector<std::string> backend_names();

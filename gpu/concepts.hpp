@@ -60,5 +60,14 @@ concept NeighborSearch =
       { constant.bytes() } -> std::same_as<std::size_t>;
     };
 
+/// A search whose particles may be a rank's own and ghosts, so many of them within a box now, and others elsewhere after the next
+/// migration.
+/// Its `integrate` calls exchange(after) when all particles have moved, with what it does at each new position
+/// (Integrate::after); ghosts have theirs when that returns.
+template <class Search>
+concept RankSearch = NeighborSearch<Search> && requires(Search search, Stream& stream, int n, const Box& where) {
+  search.set_particles(stream, n, where);
+};
+
 }  // namespace
 }  // namespace decant::gpu

@@ -119,6 +119,15 @@ const std::vector<Entry>& entries() {
        }},
       {{"hash list", "threads_per_particle", "lanes", "1, 2, 4, 8", "default: by the number of particles", false},
        set_threads},
+      {{"hash list", "ranks", "ranks", "1, N",
+        "ranks that share the particles, as threads; under mpirun its processes are the ranks", false},
+       [](O& o, const std::string& v) { o.ranks = number("ranks", v, 1, 64, "must be in 1 … 64"); }},
+      {{"hash list", "halo_margin", "halo_margin", "auto, a share of H",
+        "of ranks: how far copies of other ranks' particles reach beyond H; auto: by speed and size", false},
+       [](O& o, const std::string& v) {
+         o.halo_margin =
+             v == "auto" ? -1 : number("halo_margin", v, 0.02, 8.0, "must be auto or in 0.02 … 8, a share of H");
+       }},
       {{"hash list", "capacity", "capacity", "N", "entries per thread that a list begins with; grows where needed",
         false},
        set_capacity},
@@ -170,6 +179,9 @@ SolverOptions parse_options(const std::string& backend, const std::string& text)
     entry->set(options, item.substr(equals + 1));
     at = end + 1;
   }
+  if (backend == "hash" && options.ranks > 1 && options.lanes > 1)
+    refuse("threads_per_particle", std::to_string(options.lanes),
+           "1 with ranks: the order of sums would depend on a rank's share");
   if (options.rebuild == 0 && options.skin >= 0 && options.skin < 0.01)
     refuse("skin", text, "at least 0.01 where --rebuild is auto: without skin every move is too far");
   return options;

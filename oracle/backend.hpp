@@ -53,10 +53,19 @@ struct PairTotals {
   std::int64_t pairs = 0, missed = 0, wall_pairs = 0, wall_missed = 0;
 };
 
+/// How ranks share the particles, since `load`.
+struct RankStats {
+  std::int64_t ghosts = 0;       // copies of other ranks' particles that there are now
+  std::int64_t migrations = 0;   // moments at which particles changed ranks and ghosts were chosen
+  std::int64_t rebalances = 0;   // and the ranks' boxes as well
+  double largest_imbalance = 1;  // most particles of a rank by their mean, at the migrations since the first
+};
+
 struct NeighborStats {
   std::int64_t rebuilds = 0;             // since `load`
   std::int64_t device_bytes = 0;         // memory held; 0: not told
   double mean_fluid = 0, mean_wall = 0;  // neighbors a particle at the last evaluation
+  RankStats ranks;                       // of one rank: as it is here
   PairTotals verified;                   // of lists that verify themselves, since `load`
 };
 

@@ -36,8 +36,9 @@ TEST(BackendOptions, AreTakenByTheirEarlierNamesToo) {
 }
 
 TEST(BackendOptions, AreRefusedByKeyValueAndBound) {
-  for (const char* wrong : {"wall_cells=maybe", "wall_cells=on:grid=all", "threads_per_particle=3", "skin=0.1",
-                            "colour=red", "capacity=0", "launch"})
+  for (const char* wrong :
+       {"wall_cells=maybe", "wall_cells=on:grid=all", "threads_per_particle=3", "skin=0.1", "colour=red", "capacity=0",
+        "launch", "ranks=0", "ranks=65", "halo_margin=0", "ranks=2:threads_per_particle=2"})
     EXPECT_THROW(parse_options("hash", wrong), InputError) << wrong;
   try {
     (void)parse_options("list", "criterion=global-local");

@@ -17,13 +17,16 @@ function(decant_add_backends NAME FOLDER HAS_CUDA)
   set(cuda_sources)
   if(HAS_CUDA)
     list(TRANSFORM backends PREPEND ${FOLDER}/ OUTPUT_VARIABLE cuda_sources)
-    list(APPEND cuda_sources ${FOLDER}/core/cuda_algorithms.cu ${FOLDER}/solver/cuda_device.cu)
+    list(APPEND cuda_sources ${FOLDER}/core/cuda_algorithms.cu ${FOLDER}/ranks/nccl_exchange.cpp
+      ${FOLDER}/solver/cuda_device.cu)
+    set_source_files_properties(${FOLDER}/ranks/nccl_exchange.cpp PROPERTIES
+      INCLUDE_DIRECTORIES "${CMAKE_CUDA_TOOLKIT_INCLUDE_DIRECTORIES}")
   endif()
 
   add_library(${NAME} OBJECT ${host_sources} ${cuda_sources})
   # A backend is a translation unit; newer CMakes would put several into one.
   set_target_properties(${NAME} PROPERTIES UNITY_BUILD OFF)
-  target_compile_definitions(${NAME} PRIVATE DECANT_HAS_CUDA=${HAS_CUDA})
+  target_compile_definitions(${NAME} PRIVATE DECANT_HAS_CUDA=${HAS_CUDA} DECANT_HAS_NCCL=${DECANT_HAS_NCCL})
   if(DECANT_SANITIZE)
     # Thrust's sorting binds references to null tags, which it never reads; AddressSanitizer still sees
     # what is read through null.
@@ -36,4 +39,8 @@ function(decant_add_backends NAME FOLDER HAS_CUDA)
   target_include_directories(${NAME} SYSTEM PRIVATE
     $<$<COMPILE_LANGUAGE:CXX>:${DECANT_THRUST_INCLUDE_DIR}>)
   target_link_libraries(${NAME} PRIVATE decant_oracle_interface OpenMP::OpenMP_CXX)
+  if(HAS_CUDA AND DECANT_HAS_NCCL)
+    target_include_directories(${NAME} SYSTEM PRIVATE ${DECANT_NCCL_INCLUDE_DIR})
+    target_link_libraries(${NAME} PRIVATE ${DECANT_NCCL_LIBRARY})
+  endif()
 endfunction()

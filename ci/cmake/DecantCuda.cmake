@@ -1,5 +1,5 @@
 # Decides whether the cuda executor is built, for which GPUs, and which Thrust the host executor
-# uses. Sets DECANT_HAS_CUDA (0 or 1), DECANT_CUDA_FLAGS and DECANT_THRUST_INCLUDE_DIR.
+# uses. Sets DECANT_HAS_CUDA (0 or 1), DECANT_CUDA_FLAGS, DECANT_THRUST_INCLUDE_DIR and DECANT_HAS_NCCL (0 or 1).
 
 set(DECANT_HAS_CUDA 0)
 
@@ -66,4 +66,17 @@ endif()
 mark_as_advanced(DECANT_THRUST_INCLUDE_DIR)
 if(NOT DECANT_THRUST_INCLUDE_DIR)
   message(FATAL_ERROR "Thrust is missing (Debian and Ubuntu: libthrust-dev, or a CUDA toolkit).")
+endif()
+
+# Ranks on GPUs exchange by NCCL where it is found, else through host memory.
+set(DECANT_HAS_NCCL 0)
+if(DECANT_HAS_CUDA)
+  find_path(DECANT_NCCL_INCLUDE_DIR nccl.h HINTS ENV NCCL_HOME PATH_SUFFIXES include)
+  find_library(DECANT_NCCL_LIBRARY NAMES nccl libnccl.so.2 HINTS ENV NCCL_HOME PATH_SUFFIXES lib lib64)
+  mark_as_advanced(DECANT_NCCL_INCLUDE_DIR DECANT_NCCL_LIBRARY)
+  if(DECANT_NCCL_INCLUDE_DIR AND DECANT_NCCL_LIBRARY)
+    set(DECANT_HAS_NCCL 1)
+  else()
+    message(STATUS "No NCCL: ranks on GPUs exchange through host memory")
+  endif()
 endif()

@@ -20,23 +20,30 @@ class CellList {
   void load(Stream& stream, const Constants& c, const ParticleArrays& a, const WallStore& walls, const Box& region) {
     c_ = c;
     n_ = a.n;
+    room_ = a.room;
     walls_ = walls;
 #ifdef __CUDACC__
-    lanes_ = std::min(o_.lanes       ? o_.lanes
-                      : n_ < 8000    ? 8
-                      : n_ < 25000   ? 4
-                      : is_large(n_) ? 1
-                                     : 2,
+    lanes_ = std::min(o_.lanes            ? o_.lanes
+                      : a.on_ranks()      ? 1  // the only order of sums that does not depend on a rank's share
+                      : n_ < 8000         ? 8
+                      : n_ < 25000        ? 4
+                      : is_large(a.total) ? 1
+                                          : 2,
                       c.any_periodic || !keeps_pairs() ? most_lanes<true> : most_lanes<false>);
 #endif
-    fluid_.prepare(stream, scene_cell_table(c, region, c.H, n_), n_, scratch_);
+    table_ = {c, region, c.H, is_large(a.total) ? room_ : a.total};
+    fluid_.prepare(stream, table_.whole(), room_, scratch_);
     wall_cells_.prepare(
         stream, c_, a, walls_,
-        {o_.grid == SolverOptions::Grid::all, o_.source == SolverOptions::Source::rebuilt, !is_large(n_), c.H},
+        {o_.grid == SolverOptions::Grid::all, o_.source == SolverOptions::Source::rebuilt, !is_large(a.total), c.H},
         scratch_);
-    if (!scene_.is(c, n_, region)) lists_.choose_capacity(o_.capacity, 1, lanes_);
-    scene_.set(c, n_, region);
-    if (keeps_pairs()) lists_.reserve(n_, lanes_);
+    if (!scene_.is(c, a.total, region)) lists_.choose_capacity(o_.capacity, 1, lanes_);
+    scene_.set(c, a.total, region);
+    if (keeps_pairs()) lists_.reserve(room_, lanes_);
+  }
+  void set_particles(Stream& stream, int n, const Box& where) {
+    n_ = n;
+    table_.follow(stream, fluid_, where, room_, scratch_);
   }
 
   /// Sorting leaves the state in the spare arrays.
@@ -83,12 +90,14 @@ class CellList {
     else call(team, CellNeighbors<periodic>{{c_}, candidates(a), a});
   }
 
-  template <bool periodic>
-  void integrate(Stream& stream, const ParticleArrays& a, const DeviceGeometry& geometry, Branch) {
+  template <bool periodic, class Exchange = NoExchange>
+  void integrate(Stream& stream, const ParticleArrays& a, const DeviceGeometry& geometry, Branch,
+                 const Exchange& exchange = {}) {
     const auto launch = [&](const auto& after) {
       using After = std::decay_t<decltype(after)>;
       stream.launch(integrate_kernel<After>, n_ + walls_.moving_count(), Integrate<After>{c_, a, geometry, after},
                     walls_.moving(a));
+      exchange(after);
     };
     if (counts_ahead()) launch(CountForNextSort{fluid_.counter(fluid_source(a), scratch_)});
     else launch(NothingElse{});
@@ -110,7 +119,7 @@ class CellList {
   bool capturable() const {
     return o_.launch != SolverOptions::Launch::plain && o_.sort == SolverOptions::Sort::counting;
   }
-  bool grow(int longest) { return lists_.grow(n_, longest); }
+  bool grow(int longest) { return lists_.grow(room_, longest); }
   std::size_t bytes() const { return fluid_.bytes() + wall_cells_.bytes() + scratch_.bytes() + lists_.bytes(); }
 
  private:
@@ -125,8 +134,9 @@ class CellList {
   SolverOptions o_;
   Constants c_{};
   LoadedScene scene_;
-  int n_ = 0, lanes_ = 1;
+  int n_ = 0, room_ = 0, lanes_ = 1;  // particles, and how many there may be
   WallStore walls_{};
+  SceneCells table_;
   CellSort fluid_;
   WallCells wall_cells_;
   SortScratch scratch_;

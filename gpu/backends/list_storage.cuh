@@ -3,6 +3,7 @@
 /// the memory of the lists.
 #pragma once
 
+#include "gpu/kernels/cell_sort.cuh"
 #include "gpu/kernels/neighbor_ranges.cuh"
 #include "gpu/solver/context.cuh"
 
@@ -22,19 +23,41 @@ inline constexpr int most_lanes = rarely_used ? 2 : 8;
 
 /// The order of sums is that of the cells. So that it depends on the state at hand alone and not on one
 /// that was once loaded, which a resumed pour does not know, the table is the scene's.
-/// \param region  of make_region
-/// \param reach   at which neighbors are looked for, m
-inline CellTable scene_cell_table(const Constants& c, const Box& region, double reach, int particles) {
-  const double low[3] = {region.min.x, region.min.y, region.min.z};
-  double high[3] = {region.max.x, region.max.y, region.max.z};
-  for (int a = 0; a < 3; ++a) {
-    // What falls out of a cup stays within a few times its size, if it stays in the domain.
-    const double most = high[a] - low[a] + 16.0 * reach;
-    const double domain = double(c.domain_max[a]) - c.domain_min[a];
-    high[a] = low[a] + std::min(most, domain);
+struct SceneCells {
+  Constants c;
+  Box region;    // of make_region
+  double reach;  // at which neighbors are looked for, m
+  int particles;
+
+  CellTable whole() const { return over(region); }
+
+  /// Of a rank of a large scene: as long and as wide as the rank's part of it. Cells are the same, and where one
+  /// thread works on a particle so is the order.
+  void follow(Stream& stream, CellSort& fluid, const Box& where, int room, SortScratch& scratch) const {
+    if (!is_large(particles)) return;
+    CellTable table = over({{std::max(region.min.x, where.min.x), std::max(region.min.y, where.min.y),
+                             std::max(region.min.z, where.min.z)},
+                            {std::min(region.max.x, where.max.x), std::min(region.max.y, where.max.y),
+                             std::min(region.max.z, where.max.z)}});
+    const CellTable& now = fluid.table();
+    if (std::equal(table.wrap, table.wrap + 3, now.wrap)) return;
+    std::copy(now.origin, now.origin + 3, table.origin);
+    fluid.prepare(stream, table, room, scratch);
   }
-  return make_cell_table(c, reach, low, high, std::max(4096.0, (is_large(particles) ? 2.5 : 5.0) * particles));
-}
+
+ private:
+  CellTable over(const Box& box) const {
+    const double low[3] = {box.min.x, box.min.y, box.min.z};
+    double high[3] = {box.max.x, box.max.y, box.max.z};
+    for (int a = 0; a < 3; ++a) {
+      // What falls out of a cup stays within a few times its size, if it stays in the domain.
+      const double most = high[a] - low[a] + 16.0 * reach;
+      const double domain = double(c.domain_max[a]) - c.domain_min[a];
+      high[a] = low[a] + std::min(most, domain);
+    }
+    return make_cell_table(c, reach, low, high, std::max(4096.0, (is_large(particles) ? 2.5 : 5.0) * particles));
+  }
+};
 
 /// Lists of n particles, `lanes` for each.
 class ListStorage {

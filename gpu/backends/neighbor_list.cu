@@ -20,31 +20,34 @@ class NeighborList {
   void load(Stream& stream, const Constants& c, const ParticleArrays& a, const WallStore& walls, const Box& region) {
     c_ = c;
     n_ = a.n;
+    room_ = a.room;
     walls_ = walls;
     widest_skin_ = static_cast<float>(o_.skin < 0 ? widest : o_.skin) * c.H;
     const float reach = c.H + widest_skin_;
 #ifdef __CUDACC__
-    lanes_ = std::min(o_.lanes       ? o_.lanes
-                      : n_ < 25000   ? 4
-                      : is_large(n_) ? 1
-                                     : 2,
+    lanes_ = std::min(o_.lanes            ? o_.lanes
+                      : n_ < 25000        ? 4
+                      : is_large(a.total) ? 1
+                                          : 2,
                       c.any_periodic ? most_lanes<true> : most_lanes<false>);
 #endif
-    const CellTable table = scene_cell_table(c, region, reach, n_);
-    fluid_.prepare(stream, table, n_, scratch_);
-    if (o_.verify) checker_.prepare(stream, table, n_, scratch_);
-    origin_.resize(static_cast<std::size_t>(n_) + read_past_end);
+    table_ = {c, region, reach, is_large(a.total) ? room_ : a.total};
+    const CellTable table = table_.whole();
+    fluid_.prepare(stream, table, room_, scratch_);
+    if (o_.verify) checker_.prepare(stream, table, room_, scratch_);
+    origin_.resize(static_cast<std::size_t>(room_) + read_past_end);
     if (criterion() == Criterion::relative) {
-      bucket_.resize(static_cast<std::size_t>(n_));
+      bucket_.resize(static_cast<std::size_t>(room_));
       boxes_.resize(2 * static_cast<std::size_t>(table.supers()));
     }
-    wall_cells_.prepare(stream, c_, a, walls_, {from_cells(), false, !is_large(n_), reach}, scratch_);
-    if (!scene_.is(c, n_, region)) lists_.choose_capacity(o_.capacity, 1 + (o_.skin < 0 ? usual : o_.skin), lanes_);
-    scene_.set(c, n_, region);
-    lists_.reserve(n_, lanes_);
+    wall_cells_.prepare(stream, c_, a, walls_, {from_cells(), false, !is_large(a.total), reach}, scratch_);
+    if (!scene_.is(c, a.total, region))
+      lists_.choose_capacity(o_.capacity, 1 + (o_.skin < 0 ? usual : o_.skin), lanes_);
+    scene_.set(c, a.total, region);
+    lists_.reserve(room_, lanes_);
     persistent_blocks_ = 0;
     if (o_.launch != SolverOptions::Launch::automatic || o_.verify || !from_cells() ||
-        criterion() == Criterion::relative)
+        criterion() == Criterion::relative || a.on_ranks())
       return;
     with_periodic(c_, [&](auto periodic) {
       constexpr bool p = decltype(periodic)::value;
@@ -53,6 +56,11 @@ class NeighborList {
             persistent_blocks(persistent_list_kernel<decltype(lanes)::value, p>, persistent_shared_bytes());
       });
     });
+  }
+
+  void set_particles(Stream& stream, int n, const Box& where) {
+    n_ = n;
+    if (criterion() != Criterion::relative) table_.follow(stream, fluid_, where, room_, scratch_);
   }
 
   /// A rebuild copies particles back to where they were, in the new order.
@@ -81,12 +89,15 @@ class NeighborList {
     call(std::type_identity<SubWarp<1>>(), WholeListNeighbors<periodic>{{c_}, lists_.lists(a)});
   }
 
-  template <bool periodic>
-  void integrate(Stream& stream, const ParticleArrays& a, const DeviceGeometry& geometry, Branch next_rebuild) {
+  template <bool periodic, class Exchange = NoExchange>
+  void integrate(Stream& stream, const ParticleArrays& a, const DeviceGeometry& geometry, Branch next_rebuild,
+                 const Exchange& exchange = {}) {
     using Check = CheckDisplacement<periodic>;
     const RebuildCriterion w = rebuild_criterion(next_rebuild);
-    stream.launch(integrate_kernel<Check>, n_ + walls_.moving_count(), Integrate<Check>{c_, a, geometry, {c_, a, w}},
+    const Check check{c_, a, w};
+    stream.launch(integrate_kernel<Check>, n_ + walls_.moving_count(), Integrate<Check>{c_, a, geometry, check},
                   walls_.moving(a));
+    exchange(check);
     if (w.criterion == Criterion::relative)
       stream.launch(compare_displacement_boxes_kernel, w.supers, CompareDisplacementBoxes{w, a.status});
   }
@@ -103,7 +114,7 @@ class NeighborList {
     return true;
   }
   bool capturable() const { return o_.launch != SolverOptions::Launch::plain; }
-  bool grow(int longest) { return lists_.grow(n_, longest); }
+  bool grow(int longest) { return lists_.grow(room_, longest); }
   std::size_t bytes() const {
     return fluid_.bytes() + wall_cells_.bytes() + scratch_.bytes() + bucket_.bytes() + lists_.bytes() +
            origin_.bytes() + boxes_.bytes() + checker_.bytes();
@@ -202,10 +213,11 @@ class NeighborList {
   SolverOptions o_;
   Constants c_{};
   LoadedScene scene_;
-  int n_ = 0, lanes_ = 1;
-  int persistent_blocks_ = 0;  // 0: substep by substep
-  float widest_skin_ = 0;      // m
+  int n_ = 0, room_ = 0, lanes_ = 1;  // particles, and how many there may be
+  int persistent_blocks_ = 0;         // 0: substep by substep
+  float widest_skin_ = 0;             // m
   WallStore walls_{};
+  SceneCells table_;
   CellSort fluid_;
   WallCells wall_cells_;
   SortScratch scratch_;

@@ -12,6 +12,8 @@ namespace host {
 void exclusive_scan(const int* in, int* out, int n);
 /// Stable.
 void sort_by_key(int* keys, int* values, int n);
+/// The same from one pair of arrays to another, of keys in 0 … 2^bits − 1.
+void sort_pairs(const int* keys, int* sorted_keys, const int* values, int* sorted_values, int n, int bits);
 /// out[k] = how many of the sorted keys are below k, k < count.
 void lower_bounds(const int* keys, int n, int* out, int count);
 }  // namespace host
@@ -22,6 +24,10 @@ void exclusive_scan(const int* in, int* out, int n, void* scratch, std::size_t b
 std::size_t scan_bytes(int n);
 /// Allocates, so it cannot be captured in a graph.
 void sort_by_key(int* keys, int* values, int n, void* stream);
+/// `scratch` holds sort_bytes(n, bits) bytes.
+void sort_pairs(const int* keys, int* sorted_keys, const int* values, int* sorted_values, int n, int bits,
+                void* scratch, std::size_t bytes, void* stream);
+std::size_t sort_bytes(int n, int bits);
 void lower_bounds(const int* keys, int n, int* out, int count, void* stream);
 }  // namespace cuda
 

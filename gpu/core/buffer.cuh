@@ -50,6 +50,18 @@ class Buffer {
     }
     fill_ones(data_, size_ * sizeof(T));
   }
+  /// At least so many elements, contents undefined; with a fifth more, so that it seldom happens.
+  void reserve(std::size_t n) {
+    if (size_ < n) resize(n + n / 5);
+  }
+  /// More elements; the first `kept` are still there.
+  void grow(std::size_t n, std::size_t kept) {
+    if (n <= size_) return;
+    Buffer larger(n);
+    copy_inside(larger.data_, data_, kept * sizeof(T));
+    std::swap(data_, larger.data_);
+    std::swap(size_, larger.size_);
+  }
   void upload(const std::vector<T>& from) {
     if (size_ < from.size()) resize(from.size());
     copy_in(data_, from.data(), from.size() * sizeof(T));
@@ -83,6 +95,9 @@ class Buffer {
   static void copy_in(void* to, const void* from, std::size_t bytes) {
     if (bytes) CUDA_CHECK(cudaMemcpyAsync(to, from, bytes, cudaMemcpyHostToDevice, own_stream));
   }
+  static void copy_inside(void* to, const void* from, std::size_t bytes) {
+    if (bytes) CUDA_CHECK(cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToDevice, own_stream));
+  }
   void release() {
     if (data_) cudaFreeAsync(data_, own_stream);  // a destructor has nobody to report to
     data_ = nullptr;
@@ -94,6 +109,9 @@ class Buffer {
     if (bytes) std::memset(p, 0xFF, bytes);
   }
   static void copy_in(void* to, const void* from, std::size_t bytes) {
+    if (bytes) std::memcpy(to, from, bytes);
+  }
+  static void copy_inside(void* to, const void* from, std::size_t bytes) {
     if (bytes) std::memcpy(to, from, bytes);
   }
   void release() {
@@ -117,30 +135,35 @@ class PinnedBuffer {
 
   /// n floats from device memory, there until the next call.
   const float* download(const float* from, std::size_t n) {
-    if (n > size_) {
+    auto* to = static_cast<float*>(reserve(n * sizeof(float)));
+    copy_to_host(to, from, n * sizeof(float));
+    return to;
+  }
+  /// Room for so many bytes, there until the next call.
+  void* reserve(std::size_t bytes) {
+    if (bytes > size_) {
       release(std::exchange(data_, nullptr));
       size_ = 0;
-      data_ = allocate(n);
-      size_ = n;
+      data_ = allocate(bytes);
+      size_ = bytes;
     }
-    copy_to_host(data_, from, n * sizeof(float));
     return data_;
   }
 
  private:
 #ifdef __CUDACC__
-  static float* allocate(std::size_t n) {
+  static void* allocate(std::size_t bytes) {
     void* p = nullptr;
-    CUDA_CHECK(cudaMallocHost(&p, n * sizeof(float)));
-    return static_cast<float*>(p);
+    CUDA_CHECK(cudaMallocHost(&p, bytes));
+    return p;
   }
-  static void release(float* p) { cudaFreeHost(p); }
+  static void release(void* p) { cudaFreeHost(p); }
 #else
-  static float* allocate(std::size_t n) { return new float[n]; }
-  static void release(float* p) { delete[] p; }
+  static void* allocate(std::size_t bytes) { return ::operator new(bytes); }
+  static void release(void* p) { ::operator delete(p); }
 #endif
-  float* data_ = nullptr;
-  std::size_t size_ = 0;
+  void* data_ = nullptr;
+  std::size_t size_ = 0;  // bytes
 };
 
 /// The next `count` elements of a buffer that several arrays share, from byte `offset` on, which moves behind

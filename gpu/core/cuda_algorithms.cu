@@ -5,6 +5,7 @@
 #include <thrust/iterator/counting_iterator.h>
 #include <thrust/sort.h>
 #include <thrust/system/cuda/execution_policy.h>
+#include <cub/device/device_radix_sort.cuh>
 #include <cub/device/device_scan.cuh>
 
 namespace decant::gpu::cuda {
@@ -22,6 +23,20 @@ std::size_t scan_bytes(int n) {
 
 void sort_by_key(int* keys, int* values, int n, void* stream) {
   thrust::stable_sort_by_key(thrust::cuda::par.on(static_cast<cudaStream_t>(stream)), keys, keys + n, values);
+}
+
+void sort_pairs(const int* keys, int* sorted_keys, const int* values, int* sorted_values, int n, int bits,
+                void* scratch, std::size_t bytes, void* stream) {
+  CUDA_CHECK(cub::DeviceRadixSort::SortPairs(scratch, bytes, keys, sorted_keys, values, sorted_values, n, 0, bits,
+                                             static_cast<cudaStream_t>(stream)));
+}
+
+std::size_t sort_bytes(int n, int bits) {
+  std::size_t bytes = 0;
+  const int* in = nullptr;
+  int* out = nullptr;
+  CUDA_CHECK(cub::DeviceRadixSort::SortPairs(nullptr, bytes, in, out, in, out, n, 0, bits));
+  return bytes;
 }
 
 void lower_bounds(const int* keys, int n, int* out, int count, void* stream) {

@@ -25,7 +25,9 @@ struct Particles {
 
 struct ParticleArrays {
   int n;                   // fluid particles
-  int base;                // where wall particles begin: n, rounded up to whole tiles
+  int room;                // how many there may be
+  int total;               // of all ranks
+  int base;                // where wall particles begin: room for n, rounded up to whole tiles
   int sentinel;            // index of the last element
   Particles state, spare;  // the state between advances, and as much room again
   Particles current;       // where the substep begins, in the order in which kernels run
@@ -39,6 +41,15 @@ struct ParticleArrays {
   DeviceStatus* status;
   const DevicePose* poses;  // [(substeps + 1) × containers], substep major
   int containers;
+  // Where several ranks share a problem: ids are of this rank, in the order of the problem's. Null elsewhere.
+  const int* global_id;        // by id, the problem's
+  const unsigned char* ghost;  // by id, 1: a copy of another rank's particle
+  int* index;                  // by id, where it is in the order in which kernels run
+  int* farthest;               // by substep of the advance, |displacement|² of what moves farthest, float bits
+
+  bool on_ranks() const { return global_id != nullptr; }
+  DECANT_DEVICE bool is_ghost(int i) const { return ghost && ghost[id[i]]; }
+  DECANT_DEVICE int problem_id(int own) const { return global_id ? global_id[own] : own; }
 
   /// At the start of the substep, for all that comes before integration, and at its end, for all that
   /// comes after the densities: the one counts what has ended, the other what has begun.

@@ -81,6 +81,11 @@ class Stream {
     if (scratch.bytes() < bytes) scratch.resize(bytes);
   }
   void sort_by_key(int* keys, int* values, int n) { cuda::sort_by_key(keys, values, n, stream_); }
+  void sort_pairs(const int* keys, int* sorted_keys, const int* values, int* sorted_values, int n, int bits,
+                  Buffer<char>& scratch) {
+    scratch.reserve(cuda::sort_bytes(n, bits));
+    cuda::sort_pairs(keys, sorted_keys, values, sorted_values, n, bits, scratch.get(), scratch.bytes(), stream_);
+  }
   void lower_bounds(const int* keys, int n, int* out, int count) { cuda::lower_bounds(keys, n, out, count, stream_); }
 
   /// Runs `then` where *flag is not 0 by then. In a graph the device decides at every launch: where `branch` is
@@ -92,7 +97,7 @@ class Stream {
       int value = 0;
       CUDA_CHECK(cudaMemcpyAsync(&value, flag, sizeof value, cudaMemcpyDeviceToHost, stream_));
       CUDA_CHECK(cudaStreamSynchronize(stream_));
-      if (value != 0) then();
+      if (agree_ ? agree_(value != 0) : value != 0) then();
       return;
     }
     if (!branch.there()) {
@@ -114,6 +119,8 @@ class Stream {
     CUDA_CHECK(cudaStreamUpdateCaptureDependencies(stream_, &node, nullptr, 1, cudaStreamSetCaptureDependencies));
     capture_into(parameters.conditional.phGraph_out[0], then);
   }
+  /// From here on what `when` runs outside of a graph is decided by agree(whether *flag is not 0).
+  void agree_by(std::function<bool(bool)> agree) { agree_ = std::move(agree); }
   /// For a `when` that is yet to come and must come; not there unless a graph is captured.
   Branch new_branch() {
     Branch branch;
@@ -170,6 +177,7 @@ class Stream {
   }
 
   cudaStream_t stream_ = own_stream, captured_ = nullptr, inner_ = nullptr;
+  std::function<bool(bool)> agree_;
 };
 
 /// Work that is captured once and launched again and again.
@@ -232,13 +240,21 @@ class Stream {
   void exclusive_scan(const int* in, int* out, int n, Buffer<char>&) { host::exclusive_scan(in, out, n); }
   static void reserve_scan(int, Buffer<char>&) {}
   void sort_by_key(int* keys, int* values, int n) { host::sort_by_key(keys, values, n); }
+  void sort_pairs(const int* keys, int* sorted_keys, const int* values, int* sorted_values, int n, int bits,
+                  Buffer<char>&) {
+    host::sort_pairs(keys, sorted_keys, values, sorted_values, n, bits);
+  }
   void lower_bounds(const int* keys, int n, int* out, int count) { host::lower_bounds(keys, n, out, count); }
   template <class Then>
   void when(const int* flag, Branch, Then then) {
-    if (*flag != 0) then();
+    if (agree_ ? agree_(*flag != 0) : *flag != 0) then();
   }
+  void agree_by(std::function<bool(bool)> agree) { agree_ = std::move(agree); }
   Branch new_branch() { return {}; }
   void wait() {}
+
+ private:
+  std::function<bool(bool)> agree_;
 };
 
 class Graph {

@@ -51,6 +51,11 @@ struct BuildList {
   template <class Team>
   DECANT_DEVICE void operator()(Team& team) const {
     const int i = team.particle(0);
+    if (a.is_ghost(i)) {
+      lists.count_of(i, team.lane()) = 0;
+      if (team.is_leader()) copy(i, sorted.position[i], sorted.velocity[i]);
+      return;
+    }
     const Float3 x = xyz(positions[i]);
     const float reach = c.H + a.status->skin;
     // Without skin exactly what the kernels take for a neighbor.
@@ -69,12 +74,15 @@ struct BuildList {
     if (count > lists.capacity) atomic_maximum(&a.status->longest_list, count);
     while (list.staged.size() % 4 != 0) list.staged.append(true, lists.sentinel);
     send(list, StagingBuffer::capacity);
-    if (!copies.position || !team.is_leader()) return;
-    copies.position[i] = own;
-    copies.velocity[i] = velocity;
+    if (team.is_leader()) copy(i, own, velocity);
   }
 
  private:
+  DECANT_DEVICE void copy(int i, float4 position, float4 velocity) const {
+    if (!copies.position) return;
+    copies.position[i] = position;
+    copies.velocity[i] = velocity;
+  }
   /// Whether it is out of reach of all solids, and so of their particles.
   DECANT_DEVICE static bool far_from_walls(Float3 x, float clearance, float reach) {
     return clearance - rounding_of(x) > 1.001f * reach;
@@ -99,15 +107,16 @@ struct BuildList {
     const int bucket = candidates.all_fluid ? 0 : candidates.table.bucket_of(list.x);
     const bool twice = !candidates.all_fluid && candidates.table.goes_around(bucket);
     RowRanges<Team> ranges;
+    // One thread alone visits candidates in an order that no table's size changes: ranks have tables of their own.
+    constexpr int turns = Team::lanes == 1 ? CellTable::rows : 2;
 #pragma unroll 1
-    for (int part = 0; part < (twice ? 2 : 1); ++part) {
+    for (int turn = 0; turn < (twice ? turns : 1); ++turn) {
       for (int r = team.lane(); r < CellTable::rows; r += Team::lanes) {
         if (candidates.all_fluid) {
           ranges.row(r) = make_int2(0, r == 0 ? a.n : 0);
           continue;
         }
-        const CellTable::Range row = candidates.table.row<periodic>(bucket, r);
-        ranges.row(r) = part == 0 ? make_int2(row.begin, row.end) : make_int2(row.begin2, row.end2);
+        ranges.row(r) = row_of_turn<Team::lanes>(bucket, r, twice, turn);
       }
       team.sync();
       int r = -1, k = 0, end = 0;
@@ -140,6 +149,19 @@ struct BuildList {
         while (step(even, odd) && step(odd, even)) {
         }
       team.sync();
+    }
+  }
+  /// Rows that go around the table's end have two parts: by one thread, row after row; else the first parts of all
+  /// rows and then the second ones, which waits for memory less often.
+  template <int lanes>
+  DECANT_DEVICE int2 row_of_turn(int bucket, int r, bool twice, int turn) const {
+    if constexpr (lanes == 1) {
+      if (twice && r > 1) return make_int2(0, 0);
+      const CellTable::Range row = candidates.table.row<periodic>(bucket, twice ? turn : r);
+      return twice && r == 1 ? make_int2(row.begin2, row.end2) : make_int2(row.begin, row.end);
+    } else {
+      const CellTable::Range row = candidates.table.row<periodic>(bucket, r);
+      return turn == 0 ? make_int2(row.begin, row.end) : make_int2(row.begin2, row.end2);
     }
   }
   template <int step>

@@ -41,6 +41,7 @@ struct CountMissedPairs {
   template <class Team>
   DECANT_DEVICE void operator()(Team& team) const {
     const int i = team.particle(0);
+    if (a.is_ghost(i)) return;
     const Float3 x[1] = {xyz(a.current.position[i])};
     int fluid = 0, wall = 0, fluid_listed = 0, wall_listed = 0;
     candidates.around<periodic>(team.lane(), x[0], a.poses_before(), [&](Candidates::Run run) DECANT_INLINE {

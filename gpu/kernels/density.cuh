@@ -75,7 +75,7 @@ density_kernel(int n, Density<Neighbors> density) {
   for_each_team<Team>(n, density);
 }
 
-/// p/ρ² and 1/ρ from density and pressure given from outside, by id; and the pressure that follows from that
+/// p/ρ² and 1/ρ from density and pressure given from outside, by the id of the problem; and the pressure that follows from that
 /// density, which stands in for one that is not given.
 struct UseGivenDensity {
   Constants c;
@@ -85,10 +85,11 @@ struct UseGivenDensity {
 
   DECANT_DEVICE void operator()(int i) const {
     const int id = a.id[i];
-    const float own = pressure_at(c, density[id]);
+    const int given = a.problem_id(id);
+    const float own = pressure_at(c, density[given]);
     own_pressure[id] = own;
-    a.force_position[i].w = (pressure ? pressure[id] : own) / (density[id] * density[id]);
-    a.force_velocity[i].w = 1.0f / density[id];
+    a.force_position[i].w = (pressure ? pressure[given] : own) / (density[given] * density[given]);
+    a.force_velocity[i].w = 1.0f / density[given];
   }
 };
 DECANT_KERNEL(256) use_given_density_kernel(int n, UseGivenDensity use) { for_each_thread(n, use); }

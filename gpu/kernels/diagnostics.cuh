@@ -28,7 +28,7 @@ struct NeighborCounts {
     }
     neighbors.for_each(team, x, a.current.position, [&](int k, int j, float4, Float3, float r2) DECANT_INLINE {
       if (!(r2 < c.H2)) return;
-      if (j < a.base) add(fluid[k], a.id[j]);
+      if (j < a.base) add(fluid[k], a.problem_id(a.id[j]));
       else add(wall[k], wall_id[j - a.base]);
     });
 #pragma unroll

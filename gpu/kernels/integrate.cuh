@@ -29,12 +29,17 @@ struct Integrate {
   static constexpr bool by_team = true;
   template <class Team>
   DECANT_DEVICE void operator()(const Team& team, int i, Float3 x, Float3 v, Float3 acceleration) const {
+    if (a.is_ghost(i)) {  // moved by its own rank
+      if (i == 0 && team.is_leader()) ++a.status->substeps_ended;
+      return;
+    }
     const auto prefetched = after.prefetch(i);
     const float old_clearance = a.current.velocity[i].w, wall_step = a.status->wall_step;
     v = v + c.dt * acceleration;
     const Float3 displacement = c.dt * v;
     x = x + displacement;
     x = {wrap(0, x.x), wrap(1, x.y), wrap(2, x.z)};
+    const Float3 free_of_contact = x;
     const float rounding = rounding_of(x);
     float clearance = old_clearance - (1.001f * (sqrtf(dot(displacement, displacement)) + wall_step) + rounding);
     if (!(clearance > 1.001f * c.contact_distance + rounding))
@@ -42,6 +47,7 @@ struct Integrate {
     if (collide_with_floor(c, x, v)) clearance = 0.0f;
     if (!team.is_leader()) return;
     if (i == 0) ++a.status->substeps_ended;
+    if (a.farthest) note_displacement(displacement + (x - free_of_contact));
     if (!is_finite(x) || !is_finite(v)) report(&a.status->non_finite, a.status->substeps_begun, a.id[i]);
     else if (escaped(0, x.x) || escaped(1, x.y) || escaped(2, x.z))
       report(&a.status->escaped, a.status->substeps_begun, a.id[i]);
@@ -51,6 +57,13 @@ struct Integrate {
   }
 
  private:
+  DECANT_DEVICE void note_displacement(Float3 d) const {
+    const float square = dot(d, d), bounded = square <= 3.0e38f ? square : 3.4e38f;  // NaN is far
+    int bits;
+    memcpy(&bits, &bounded, sizeof bits);
+    int* farthest = a.farthest + a.status->substeps_begun - 1;
+    if (bits > atomic_load(farthest)) atomic_maximum(farthest, bits);
+  }
   DECANT_DEVICE float wrap(int axis, float x) const {
     if (!c.periodic[axis]) return x;
     return x - c.period[axis] * floorf((x - c.domain_min[axis]) * c.inverse_period[axis]);

@@ -47,6 +47,7 @@ struct FluidSource {
     into.position[to] = from.position[i];
     into.velocity[to] = from.velocity[i];
     a.id[to] = id;
+    if (a.index) a.index[id] = to;
     if (origin) store_origin(to, in_bucket, position(i));
   }
   /// What the rebuild criterion asks for later.

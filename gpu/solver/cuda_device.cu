@@ -24,6 +24,15 @@ std::string device(std::string* why_not) {
          std::to_string(properties.minor);
 }
 
+void use_device(int rank) {
+  int count = 0;
+  if (cudaGetDeviceCount(&count) != cudaSuccess || count == 0) {
+    cudaGetLastError();  // the ranks of the other executor need none
+    return;
+  }
+  CUDA_CHECK(cudaSetDevice(rank % count));
+}
+
 void start_profiler() { CUDA_CHECK(cudaProfilerStart()); }
 
 }  // namespace decant::gpu::cuda

@@ -7,6 +7,7 @@
 #include "gpu/solver/device_solver.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace decant::gpu {
@@ -19,7 +20,14 @@ class SceneArrays {
   void load(const Problem& problem) {
     c_ = problem.constants;
     containers_ = static_cast<int>(problem.geometry.shapes.size());
-    n_ = static_cast<int>(problem.position.size() / 3);
+    n_ = room_ = static_cast<int>(problem.position.size() / 3);
+    total_ = n_;
+    if (!problem.rank_boxes.empty()) {
+      total_ = problem.particles;
+      // Ghosts are to come: some layers around what is about a cube.
+      const double layers = 10 * std::cbrt(static_cast<double>(n_) * n_);
+      room_ = std::min(total_, n_ + static_cast<int>(layers) + n_ / 20) + tile_size;
+    }
     load_geometry(problem.geometry);
     load_walls(problem.walls);
     allocate();
@@ -35,11 +43,33 @@ class SceneArrays {
   const DeviceGeometry& geometry() const { return geometry_; }
   const WallStore& walls() const { return walls_; }
   int particles() const { return n_; }
+  /// Of a rank, whose number changes; as many as there is room for.
+  void set_particles(int n) { n_ = n; }
+  int room() const { return room_; }
+  /// More room; the state is still there, walls are to be placed again.
+  void grow(int room) {
+    const auto n = static_cast<std::size_t>(n_);
+    room_ = room;
+    const auto all = static_cast<std::size_t>(sentinel()) + 1 + read_past_end, some = static_cast<std::size_t>(room_);
+    state_.position.grow(all, n);
+    state_.velocity.grow(some, n);
+    id_.grow(some, n);
+    spare_.position.resize(all);
+    spare_.velocity.resize(some);
+    force_position_.resize(all);
+    force_velocity_.resize(all);
+    saved_.resize(some * saved_bytes);
+    place_sentinel();
+  }
+  /// Room for 32 bytes per particle, between advances.
+  void* scratch() const { return saved_.get(); }
   /// All but which of them hold the state at a substep's start and end.
   ParticleArrays arrays() {
     ParticleArrays a{};
     a.n = n_;
-    a.base = padded(n_);
+    a.room = room_;
+    a.total = total_;
+    a.base = padded(room_);
     a.sentinel = sentinel();
     a.state = {state_.position.get(), state_.velocity.get()};
     a.spare = {spare_.position.get(), spare_.velocity.get()};
@@ -156,7 +186,7 @@ class SceneArrays {
   }
 
   void allocate() {
-    const auto n = static_cast<std::size_t>(n_);
+    const auto n = static_cast<std::size_t>(room_);
     const auto all = static_cast<std::size_t>(sentinel()) + 1 + read_past_end;
     state_.position.resize(all);
     state_.velocity.resize(n);
@@ -168,7 +198,7 @@ class SceneArrays {
     saved_.resize(n * saved_bytes);
     status_.resize(1);
   }
-  int sentinel() const { return padded(n_) + walls_.padded_total(); }
+  int sentinel() const { return padded(room_) + walls_.padded_total(); }
   /// In the arrays that neighbors are read from. Its squared distance is finite.
   void place_sentinel() {
     const std::vector<float4> far{make_float4(1e12f, 1e12f, 1e12f, 0.0f)}, none{make_float4(0, 0, 0, 0)};
@@ -193,15 +223,16 @@ class SceneArrays {
   template <class Each>
   void each_saved(Each each) {
     std::size_t at = 0;
-    const auto n = static_cast<std::size_t>(n_);
-    each(state_.position.get(), carve<float4>(saved_, at, n), n * sizeof(float4));
-    each(state_.velocity.get(), carve<float4>(saved_, at, n), n * sizeof(float4));
-    each(id_.get(), carve<int>(saved_, at, n), n * sizeof(int));
+    const auto n = static_cast<std::size_t>(n_), room = static_cast<std::size_t>(room_);
+    each(state_.position.get(), carve<float4>(saved_, at, room), n * sizeof(float4));
+    each(state_.velocity.get(), carve<float4>(saved_, at, room), n * sizeof(float4));
+    each(id_.get(), carve<int>(saved_, at, room), n * sizeof(int));
   }
 
   bool stores_square_;
   Constants c_{};
   int containers_ = 0, n_ = 0, m_ = 0;
+  int room_ = 0, total_ = 0;  // fluid particles there may be here, and those of all ranks
   Buffer<Shape> shapes_;
   Buffer<Edge> edges_;
   Buffer<Box> boxes_;

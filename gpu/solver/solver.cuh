@@ -12,11 +12,14 @@
 #include "gpu/kernels/diagnostics.cuh"
 #include "gpu/kernels/force.cuh"
 #include "gpu/solver/device_solver.hpp"
+#include "gpu/solver/halo.cuh"
 #include "gpu/solver/output_buffers.cuh"
 #include "gpu/solver/scene_arrays.cuh"
 #include "reference/error.hpp"
 
 #include <algorithm>
+#include <optional>
+#include <utility>
 
 namespace decant::gpu {
 namespace {
@@ -24,7 +27,18 @@ namespace {
 template <NeighborSearch Search>
 class Solver : public DeviceSolver {
  public:
-  explicit Solver(const SolverOptions& options) : search_(options), scene_(Search::stores_square) {}
+  explicit Solver(const SolverOptions& options)
+      : search_(options), scene_(Search::stores_square), halo_margin_(options.halo_margin) {}
+
+  void join(Communicator& ranks) override {
+    if constexpr (RankSearch<Search>) {
+      halo_.emplace(ranks, halo_margin_);
+      // A rank that builds its lists when others do not lets them wait, and the other way round.
+      stream_.agree_by([&ranks](bool own) { return ranks.any(own); });
+    } else {
+      DeviceSolver::join(ranks);
+    }
+  }
 
   void load(const Problem& problem) override {
     loaded_ = false;  // should anything below fail
@@ -34,7 +48,9 @@ class Solver : public DeviceSolver {
     times_ = {};
     rebuilds_ = advances_ = 0;
     totals_ = {};
-    search_.load(stream_, c(), arrays(), scene_.walls(), problem.region);
+    region_ = problem.region;
+    if (halo_) halo_->load(problem, scene_);
+    search_.load(stream_, c(), arrays(), scene_.walls(), region_);
     stream_.wait();
     in_use_ = Structures::none;
     loaded_ = true;
@@ -42,6 +58,7 @@ class Solver : public DeviceSolver {
 
   Status evaluate(const std::vector<DevicePose>& poses, const GivenInputs& given, HostFields& out) override {
     require_loaded();
+    if (halo_ && !halo_->fresh()) refresh_halo();
     std::vector<float> own_volume = scene_.boundary_volumes();
     if (!given.boundary_volume.empty()) {
       scene_.set_boundary_volumes(given.boundary_volume);
@@ -60,6 +77,7 @@ class Solver : public DeviceSolver {
 
   Status evaluate_density(const std::vector<DevicePose>& poses, HostFields& out) override {
     require_loaded();
+    if (halo_ && !halo_->fresh()) refresh_halo();
     const DeviceStatus status = compute(poses, [&]<bool periodic>(std::bool_constant<periodic>) {
       const ParticleArrays a = arrays();
       find_neighbors<periodic>(a, {});
@@ -73,26 +91,19 @@ class Solver : public DeviceSolver {
 
   Status advance(int substeps, const std::vector<DevicePose>& poses) override {
     require_loaded();
-    upload_poses(poses);
-    in_use_ = Structures::none;  // should anything below fail
-    scene_.save_state(stream_);
-    DeviceStatus status;
-    for (;;) {
-      begin();
-      in_use_ = run(substeps);
-      stream_.wait();
-      status = scene_.status();
-      if (!grow(status)) break;
-      scene_.restore_state(stream_);
+    if (!halo_) return run_part(substeps, poses);
+    halo_->begin_advance(stream_, scene_);
+    Status status;
+    const auto containers = static_cast<std::ptrdiff_t>(poses.size()) / (substeps + 1);
+    for (int done = 0; done < substeps && status.ok();) {
+      refresh_halo();
+      int count = halo_->substeps_to_try(stream_, substeps - done);
+      const auto first = poses.begin() + done * containers;
+      status = run_part(count, {first, first + (count + 1) * containers});
+      if (!status.ok()) status.substep += done;
+      done += count;
     }
-    timer_.read();
-    rebuilds_ += status.rebuilds;
-    add_times(status);
-    totals_.pairs += status.pairs;
-    totals_.missed += status.pairs_missed;
-    totals_.wall_pairs += status.wall_pairs;
-    totals_.wall_missed += status.wall_pairs_missed;
-    return status_of(status);
+    return status;
   }
 
   StateRows read() override { return scene_.read(stream_); }
@@ -100,7 +111,9 @@ class Solver : public DeviceSolver {
   StageTimes stage_times() const override { return times_; }
   std::int64_t rebuilds() const override { return rebuilds_; }
   PairTotals pair_totals() const override { return totals_; }
-  std::size_t device_bytes() const override { return scene_.bytes() + search_.bytes(); }
+  std::size_t device_bytes() const override { return scene_.bytes() + search_.bytes() + (halo_ ? halo_->bytes() : 0); }
+  RankRows rank_rows() const override { return halo_ ? halo_->rows(scene_.particles()) : RankRows(); }
+  RankStatistics rank_statistics() const override { return halo_ ? halo_->statistics() : RankStatistics(); }
 
  private:
   // Substeps of the long graph: launching it is then cheap beside running it.
@@ -123,6 +136,7 @@ class Solver : public DeviceSolver {
   ParticleArrays arrays() {
     ParticleArrays a = scene_.arrays();
     search_.arrange(a);
+    if (halo_) halo_->attach(a);
     return a;
   }
   void upload_poses(const std::vector<DevicePose>& poses) {
@@ -145,6 +159,43 @@ class Solver : public DeviceSolver {
       in_use_ = Structures::none;
     } while (grow(status));
     return status;
+  }
+
+  /// All of an advance, or on ranks what may be run with the ghosts that there are: `substeps` is then how many were.
+  Status run_part(int& substeps, const std::vector<DevicePose>& poses) {
+    upload_poses(poses);
+    in_use_ = Structures::none;  // should anything below fail
+    scene_.save_state(stream_);
+    DeviceStatus status;
+    for (;;) {
+      begin();
+      in_use_ = run(substeps);
+      stream_.wait();
+      status = scene_.status();
+      bool again = grow(status);
+      if (halo_ && !again) {
+        const int hold = halo_->substeps_that_hold(substeps);
+        again = hold < substeps;
+        substeps = hold;
+      }
+      if (!again) break;
+      scene_.restore_state(stream_);
+    }
+    timer_.read();
+    rebuilds_ += status.rebuilds;
+    add_times(status);
+    totals_.pairs += status.pairs;
+    totals_.missed += status.pairs_missed;
+    totals_.wall_pairs += status.wall_pairs;
+    totals_.wall_missed += status.wall_pairs_missed;
+    return status_of(status);
+  }
+  void refresh_halo() {
+    in_use_ = Structures::none;
+    if constexpr (RankSearch<Search>) {
+      halo_->refresh(stream_, scene_, [&] { search_.load(stream_, c(), arrays(), scene_.walls(), region_); });
+      search_.set_particles(stream_, scene_.particles(), halo_->reach());
+    }
   }
 
   /// One substep: neighbors, density and pressure, forces, motion.
@@ -185,6 +236,7 @@ class Solver : public DeviceSolver {
                                                      std::type_identity<Team>, const Neighbors& near) {
       stream_.template launch_teams<Team>(density_kernel<Team, Neighbors>, a.n, Density<Neighbors>{c(), a, near, out});
     });
+    if (halo_) halo_->exchange_densities(stream_, a);
   }
   template <bool periodic>
   void compute_force(const ParticleArrays& a, const OutputArrays& out) {
@@ -198,6 +250,11 @@ class Solver : public DeviceSolver {
   template <bool periodic>
   void integrate(const ParticleArrays& a, Branch next_rebuild) {
     const NamedRange range("integrate");
+    if constexpr (RankSearch<Search>)
+      if (halo_)
+        return search_.template integrate<periodic>(
+            stream_, a, scene_.geometry(), next_rebuild,
+            [&](const auto& after) { halo_->exchange_states(stream_, a, after); });
     search_.template integrate<periodic>(stream_, a, scene_.geometry(), next_rebuild);
   }
   template <bool periodic>
@@ -262,7 +319,8 @@ class Solver : public DeviceSolver {
   void run_substeps(int substeps) {
     int done = 0;
     const int sample = advances_++ % 8 == 1 ? 2 : 0;
-    const int timed = search_.capturable() ? std::min(substeps, sample) : substeps;
+    // What ranks exchange waits for the host.
+    const int timed = search_.capturable() && !halo_ ? std::min(substeps, sample) : substeps;
     for (; done < timed; ++done) {
       substep<periodic>({true, {}, {}});
       // Events are many; reading them now and then keeps their number small.
@@ -302,13 +360,30 @@ class Solver : public DeviceSolver {
 
   /// Whether lists were too short and have grown. Graphs know where the lists were.
   bool grow(const DeviceStatus& status) {
-    if (status.longest_list == 0 || !search_.grow(status.longest_list)) return false;
-    long_graph_.clear();
-    short_graph_.clear();
-    return true;
+    const bool grown = status.longest_list != 0 && search_.grow(status.longest_list);
+    if (grown) {
+      long_graph_.clear();
+      short_graph_.clear();
+    }
+    return halo_ ? halo_->ranks().any(grown) : grown;
   }
 
-  static Status status_of(const DeviceStatus& from) {
+  Status status_of(const DeviceStatus& from) const {
+    const Status own = own_status_of(from);
+    if (!halo_) return own;
+    // All ranks end with the same one: what came first, of the particle with the smallest id.
+    Status first;
+    for (const Status& s : halo_->ranks().all(own)) {
+      first.bits |= s.bits;
+      if (s.particle < 0) continue;
+      if (first.particle < 0 || std::pair(s.substep, s.particle) < std::pair(first.substep, first.particle)) {
+        first.substep = s.substep;
+        first.particle = s.particle;
+      }
+    }
+    return first;
+  }
+  Status own_status_of(const DeviceStatus& from) const {
     Status status;
     const unsigned long long first = std::min({from.non_finite, from.escaped, from.missed_pair});
     if (from.non_finite != DeviceStatus::none) status.bits |= Status::non_finite;
@@ -318,6 +393,7 @@ class Solver : public DeviceSolver {
     if (from.longest_list != 0) status.bits |= Status::capacity;
     if (first != DeviceStatus::none) {
       status.particle = static_cast<std::int64_t>(first & 0xFFFFFFFFull);
+      if (halo_) status.particle = halo_->problem_id(status.particle);
       status.substep = static_cast<std::int64_t>(first >> 32);
     }
     return status;
@@ -326,6 +402,9 @@ class Solver : public DeviceSolver {
   Stream stream_;
   Search search_;
   SceneArrays scene_;
+  double halo_margin_;        // of H
+  std::optional<Halo> halo_;  // of one rank of several
+  Box region_{};
   OutputBuffers output_;
   bool loaded_ = false;
   Structures in_use_ = Structures::none;

@@ -52,6 +52,8 @@ nlohmann::ordered_json collect() {
        nlohmann::ordered_json::array({executor_info("host", Executor::host), executor_info("cuda", Executor::cuda)})},
       {"libraries",
        {{"Thrust", thrust_version()},
+        {"MPI", mpi_version()},
+        {"NCCL", nccl_version()},
         {"HDF5", hdf5_version()},
         {"Eigen", fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
         {"fmt", fmt::format("{}.{}.{}", FMT_VERSION / 10000, FMT_VERSION / 100 % 100, FMT_VERSION % 100)},

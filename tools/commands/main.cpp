@@ -1,6 +1,7 @@
 /// \file
 /// The `decant` command: finds the verb, runs it, and turns what went wrong into one line and an
 /// exit status.
+#include "gpu/backends.hpp"
 #include "reference/error.hpp"
 #include "tools/commands/backend_choice.hpp"
 #include "tools/commands/commands.hpp"
@@ -73,6 +74,8 @@ int main(int argc, char** argv) {
     return exit_bad_input;
   }
   try {
+    ProcessRanks ranks;
+    if (ranks.serve()) return exit_pass;
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
     return status;
   } catch (const CLI::Success& help_or_version) {

@@ -1,0 +1,422 @@
+/// \file
+/// A rank's ghosts: copies of other ranks' particles that may come within H of its own. Which they are is decided by
+/// place, with a margin, and holds until a particle has moved by half of it; migration and the ranks' boxes change
+/// at the same moments only. Between them every substep exchanges the same particles.
+///
+/// How far particles move is known when they have moved. So a number of substeps is tried, and where that was too
+/// many for the margin, the state is restored and fewer are run. No result depends on any of this.
+#pragma once
+
+#include "gpu/kernels/cell_sort.cuh"
+#include "gpu/kernels/exchange.cuh"
+#include "gpu/kernels/migrate.cuh"
+#include "gpu/ranks/partition.hpp"
+#include "gpu/ranks/transport.cuh"
+#include "gpu/solver/scene_arrays.cuh"
+#include "reference/error.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace decant::gpu {
+namespace {
+
+class Halo {
+ public:
+  /// \param margin  of H; negative: by the speed of the fastest particle
+  Halo(Communicator& ranks, double margin)
+      : ranks_(ranks), transport_(ranks), margin_of_h_(static_cast<float>(margin)) {}
+
+  Communicator& ranks() const { return ranks_; }
+  bool fresh() const { return fresh_; }
+  /// Where a rank's own particles and ghosts are.
+  const Box& reach() const { return reach_; }
+  const RankStatistics& statistics() const { return statistics_; }
+
+  void load(const Problem& problem, const SceneArrays& scene) {
+    fresh_ = false;
+    statistics_ = {};
+    reserve(scene.room());
+    global_id_.upload(problem.id);
+    ghost_.upload(std::vector<unsigned char>(problem.id.size(), 0));
+    step_ = 0;
+    place_boxes(problem.constants, problem.rank_boxes, problem.particles);
+    statistics_.owned = static_cast<std::int64_t>(problem.id.size());
+  }
+
+  void attach(ParticleArrays& a) const {
+    a.global_id = global_id_.get();
+    a.ghost = ghost_.get();
+    a.index = index_.get();
+    a.farthest = farthest_.get();
+  }
+
+  /// Brings every particle to the ranks that need it. `reload` is called where there is more room afterwards.
+  template <class Reload>
+  void refresh(Stream& stream, SceneArrays& scene, Reload reload) {
+    if (statistics_.refreshes > 0) {
+      const double now = present_imbalance();
+      statistics_.largest_imbalance = std::max(statistics_.largest_imbalance, now);
+      if (now > most_imbalance) survey(stream, scene);
+    }
+    const int kept = assign(stream, scene);
+    const std::vector<int> departing = counts(departing_);
+    const std::vector<int> arriving = transposed(departing);
+    const int arrivals = std::accumulate(arriving.begin(), arriving.end(), 0);
+    if (kept + arrivals > scene.room()) {
+      scene.grow(kept + arrivals + (kept + arrivals) / 20 + tile_size);
+      global_id_.grow(static_cast<std::size_t>(scene.room()), static_cast<std::size_t>(scene.particles()));
+      ghost_.grow(static_cast<std::size_t>(scene.room()), static_cast<std::size_t>(scene.particles()));
+      reserve(scene.room());
+      reload();
+      assign(stream, scene);
+    }
+    migrate(stream, scene, departing, arriving, kept);
+    number(stream, scene, kept + arrivals);
+    fresh_ = true;
+    ++statistics_.refreshes;
+  }
+
+  /// Before an advance: boxes, and how far particles will move, are those of the state and of nothing before, so that
+  /// a resumed pour does what an uninterrupted one does.
+  void begin_advance(Stream& stream, SceneArrays& scene) {
+    most_substeps_ = first_substeps;
+    survey(stream, scene);
+  }
+
+  /// How many substeps may be tried, of so many that are wanted.
+  int substeps_to_try(Stream& stream, int wanted) {
+    const double fit = step_ > 0 ? std::floor(0.5 * margin_ / (1.1 * step_)) + 1 : wanted;
+    const int count = static_cast<int>(std::clamp<double>(fit, 1, std::min(wanted, most_substeps_)));
+    farthest_.reserve(static_cast<std::size_t>(count));
+    stream.fill_zero(farthest_.get(), static_cast<std::size_t>(count) * sizeof(int));
+    return count;
+  }
+  /// How many of `count` substeps were run with all ghosts that they needed.
+  int substeps_that_hold(int count) {
+    const auto n = static_cast<std::size_t>(count);
+    std::vector<int> own = farthest_.download(n), all(n * static_cast<std::size_t>(ranks_.size()));
+    ranks_.all_gather(own.data(), n * sizeof(int), all.data());
+    double way = 0;
+    int hold = 1;
+    for (std::size_t s = 0; s < n; ++s) {
+      int bits = 0;
+      for (std::size_t r = 0; r < static_cast<std::size_t>(ranks_.size()); ++r) bits = std::max(bits, all[r * n + s]);
+      float square = 0;
+      std::memcpy(&square, &bits, sizeof square);
+      step_ = std::sqrt(square);
+      way += step_;
+      fresh_ = way <= 0.5 * margin_;
+      if (!fresh_ || s + 1 == n) break;
+      hold = static_cast<int>(s) + 2;
+    }
+    most_substeps_ = std::clamp(2 * hold, first_substeps, most_tried);
+    return hold;
+  }
+
+  void exchange_densities(Stream& stream, const ParticleArrays& a) {
+    auto *out = reinterpret_cast<DensityTerms*>(out_.get()), *in = reinterpret_cast<DensityTerms*>(in_.get());
+    stream.launch(pack_densities_kernel, sum(sends_), PackDensities{a, send_.get(), out});
+    exchange(stream, out, in);
+    stream.launch(unpack_densities_kernel, sum(receives_), UnpackDensities{a, receive_.get(), in});
+  }
+  /// \param after  Integrate::after
+  template <class After>
+  void exchange_states(Stream& stream, const ParticleArrays& a, const After& after) {
+    stream.launch(pack_states_kernel, sum(sends_), PackStates{a, send_.get(), out_.get()});
+    exchange(stream, out_.get(), in_.get());
+    stream.launch(unpack_states_kernel<After>, sum(receives_),
+                  UnpackStates<After>{a, receive_.get(), in_.get(), after});
+  }
+
+  RankRows rows(int n) const {
+    RankRows rows{global_id_.download(static_cast<std::size_t>(n)), ghost_.download(static_cast<std::size_t>(n))};
+    for (unsigned char& is : rows.owned) is = is ? 0 : 1;
+    return rows;
+  }
+  /// The problem's id of one of this rank's.
+  std::int64_t problem_id(std::int64_t id) const {
+    int global = -1;
+    if (id >= 0 && id < static_cast<std::int64_t>(global_id_.size()))
+      global_id_.download_bytes(&global, global_id_.get() + id, sizeof global);
+    return global;
+  }
+  std::size_t bytes() const {
+    return global_id_.bytes() + ghost_.bytes() + index_.bytes() + farthest_.bytes() + send_.bytes() + receive_.bytes() +
+           values_.bytes() + scan_.bytes() + sort_.bytes() + travellers_out_.bytes() + travellers_in_.bytes() +
+           out_.bytes() + in_.bytes();
+  }
+
+ private:
+  static constexpr int first_substeps = 16, most_tried = 256;
+  static constexpr double most_imbalance = 1.08;
+  static constexpr int samples = 4096;  // per rank
+
+  int count() const { return ranks_.size(); }
+  static int sum(const std::vector<int>& values) { return std::accumulate(values.begin(), values.end(), 0); }
+  std::vector<int> counts(const Buffer<int>& from) const { return from.download(static_cast<std::size_t>(count())); }
+
+  void reserve(int room) {
+    const auto n = static_cast<std::size_t>(room);
+    for (Buffer<int>* each : {&global_id_, &index_})
+      if (each->size() < n) each->resize(n);
+    if (ghost_.size() < n) ghost_.resize(n);
+    for (Buffer<int>* each :
+         {&departing_, &gone_, &first_, &sends_counted_, &receives_counted_, &first_send_, &first_receive_})
+      each->resize(most_ranks);
+    doubled_.resize(1);
+  }
+  /// What each other rank has for this one, where `own` is what this one has for each.
+  std::vector<int> transposed(const std::vector<int>& own) const {
+    const auto n = static_cast<std::size_t>(count());
+    std::vector<int> all(n * n), to_here(n);
+    ranks_.all_gather(own.data(), n * sizeof(int), all.data());
+    for (std::size_t r = 0; r < n; ++r) to_here[r] = all[r * n + static_cast<std::size_t>(ranks_.rank())];
+    return to_here;
+  }
+
+  /// What ghosts cost grows with the margin m, their layers beside n particles; what migrations cost falls with it,
+  /// one in m H / (2 step) substeps. The sum is least at m² = (step/H) n^⅓ (dx/H) (cost of a migration by that of a
+  /// substep) / (cost of a ghost by that of a particle), the latter two about 1 and 1 as measured.
+  float margin(const Constants& c, int total) const {
+    if (margin_of_h_ >= 0) return margin_of_h_ * c.H;
+    const double dx = std::cbrt(c.mass * c.inverse_rest_density), n = static_cast<double>(total) / count();
+    return static_cast<float>(std::clamp(std::sqrt(step_ / c.H * std::cbrt(n) * dx / c.H), 0.1, 3.0)) * c.H;
+  }
+  void place_boxes(const Constants& c, const std::vector<Box>& boxes, int total) {
+    margin_ = margin(c, total);
+    std::vector<Box> reach = boxes;
+    for (Box& box : reach) {
+      float *low = &box.min.x, *high = &box.max.x;
+      for (int a = 0; a < 3; ++a) {
+        // A periodic axis has no outside, and an image of everything would lie in an infinite box.
+        if (c.periodic[a]) {
+          low[a] = std::max(low[a], c.domain_min[a]);
+          high[a] = std::min(high[a], c.domain_min[a] + c.period[a]);
+        }
+        const float width = 1.001f * (c.H + margin_) + 0x1p-19f * (c.period[a] + extent(low[a]) + extent(high[a]));
+        low[a] -= width;
+        high[a] += width;
+      }
+    }
+    own_boxes_.upload(boxes);
+    reach_boxes_.upload(reach);
+    reach_ = reach[static_cast<std::size_t>(ranks_.rank())];
+  }
+  static float extent(float x) { return std::isfinite(x) ? std::fabs(x) : 0.0f; }
+  RankBoxes boxes() const { return {ranks_.rank(), count(), own_boxes_.get(), reach_boxes_.get()}; }
+
+  double present_imbalance() const {
+    std::vector<double> work;
+    for (const std::int64_t owned : ranks_.all(statistics_.owned)) work.push_back(static_cast<double>(owned));
+    return imbalance(work);
+  }
+
+  struct Sample {
+    int id;
+    WorkSample work;
+  };
+  /// New boxes, and the speed of the fastest particle.
+  void survey(Stream& stream, SceneArrays& scene) {
+    const Constants& c = scene.constants();
+    ParticleArrays a = scene.arrays();
+    attach(a);
+    const int every = std::max(1, a.total / (samples * count())), room = a.total / every + 1;
+    Buffer<float4> position(static_cast<std::size_t>(room));
+    Buffer<int> id(static_cast<std::size_t>(room)), found(2);  // samples, speed
+    stream.fill_zero(found.get(), found.bytes());
+    stream.launch(survey_kernel, a.n, Survey{a, every, room, position.get(), id.get(), found.get(), found.get() + 1});
+    stream.wait();
+    const std::vector<int> counted = found.download(2);
+    float square = 0;
+    std::memcpy(&square, &counted[1], sizeof square);
+    step_ = c.dt * (std::sqrt(square) + c.dt * std::sqrt(c.gravity.x * c.gravity.x + c.gravity.y * c.gravity.y +
+                                                         c.gravity.z * c.gravity.z));
+    for (const double other : ranks_.all(step_)) step_ = std::max(step_, other);
+    const auto n = static_cast<std::size_t>(std::min(counted[0], room));
+    const std::vector<float4> x = position.download(n);
+    const std::vector<int> ids = id.download(n);
+    std::vector<Sample> own;
+    for (std::size_t k = 0; k < n; ++k) own.push_back({ids[k], {{x[k].x, x[k].y, x[k].z}, 1.0f}});
+    choose_boxes(c, own, a.total);
+  }
+  void choose_boxes(const Constants& c, const std::vector<Sample>& own, int total) {
+    Writer packed;
+    packed << own;
+    std::vector<Sample> all;
+    for (const Bytes& of_rank : ranks_.gather(packed.take())) {
+      std::vector<Sample> some;
+      Reader(of_rank) >> some;
+      all.insert(all.end(), some.begin(), some.end());
+    }
+    std::vector<Box> boxes;
+    if (ranks_.rank() == 0) {
+      std::ranges::sort(all, {}, &Sample::id);
+      std::vector<WorkSample> work;
+      for (const Sample& s : all) work.push_back(s.work);
+      boxes = bisect(std::move(work), count());
+    }
+    Writer chosen;
+    chosen << boxes;
+    Bytes bytes = chosen.take();
+    ranks_.broadcast(bytes);
+    Reader(bytes) >> boxes;
+    place_boxes(c, boxes, total);
+    ++statistics_.rebalances;
+  }
+
+  // Memory that is free between advances: what the kernels of a substep write first. Four arrays of ints fit into
+  // one of positions.
+  static Registration* before(const ParticleArrays& a) { return reinterpret_cast<Registration*>(a.force_position); }
+  static Registration* after(const SceneArrays& scene) { return static_cast<Registration*>(scene.scratch()); }
+  static int* ints(const ParticleArrays& a, int k) {
+    return reinterpret_cast<int*>(a.force_velocity) + k * (padded(a.room) + SortScratch::scan_padding);
+  }
+  static_assert(4 * SortScratch::scan_padding <= 4 * read_past_end);
+
+  /// Who needs which particle; how many stay.
+  int assign(Stream& stream, SceneArrays& scene) {
+    ParticleArrays a = scene.arrays();
+    attach(a);
+    const int n = a.n;
+    stream.fill_zero(departing_.get(), departing_.bytes());
+    stream.fill_zero(ints(a, 0) + n, SortScratch::scan_padding * sizeof(int));
+    stream.launch(assign_ranks_kernel, n,
+                  AssignRanks{scene.constants(), a, boxes(), before(a), ints(a, 0), departing_.get()});
+    Stream::reserve_scan(n + 1, scan_);
+    stream.exclusive_scan(ints(a, 0), ints(a, 1), n + 1, scan_);
+    stream.wait();
+    int stay = 0;
+    copy_to_host(&stay, ints(a, 1) + n, sizeof stay);
+    return stay;
+  }
+
+  void migrate(Stream& stream, SceneArrays& scene, const std::vector<int>& departing, const std::vector<int>& arriving,
+               int kept) {
+    ParticleArrays a = scene.arrays();
+    attach(a);
+    travellers_out_.reserve(static_cast<std::size_t>(sum(departing)));
+    travellers_in_.reserve(static_cast<std::size_t>(sum(arriving)));
+    first_.upload(starts(departing));
+    stream.fill_zero(gone_.get(), gone_.bytes());
+    stream.launch(depart_kernel, a.n,
+                  Depart{a, boxes(), before(a), ints(a, 0), ints(a, 1), first_.get(), gone_.get(), after(scene),
+                         travellers_out_.get()});
+    transport_.exchange(stream, segments(travellers_out_.get(), departing), segments(travellers_in_.get(), arriving));
+    stream.launch(arrive_kernel, sum(arriving), Arrive{a, travellers_in_.get(), kept, after(scene)});
+    const auto bytes = static_cast<std::size_t>(kept + sum(arriving)) * sizeof(float4);
+    stream.copy(a.state.position, a.spare.position, bytes);
+    stream.copy(a.state.velocity, a.spare.velocity, bytes);
+  }
+
+  void number(Stream& stream, SceneArrays& scene, int n) {
+    scene.set_particles(n);
+    ParticleArrays a = scene.arrays();
+    attach(a);
+    int *key = ints(a, 2), *at = ints(a, 3);
+    stream.launch(key_by_id_kernel, n, KeyById{after(scene), ints(a, 0), ints(a, 1)});
+    stream.sort_pairs(ints(a, 0), key, ints(a, 1), at, n, bits_below(a.total), sort_);
+    for (Buffer<int>* each : {&sends_counted_, &receives_counted_, &doubled_})
+      stream.fill_zero(each->get(), each->bytes());
+    stream.launch(number_by_id_kernel, n,
+                  NumberById{a, boxes(), after(scene), key, at, global_id_.get(), ghost_.get(), sends_counted_.get(),
+                             receives_counted_.get(), doubled_.get()});
+    stream.wait();
+    sends_ = counts(sends_counted_);
+    receives_ = counts(receives_counted_);
+    statistics_.ghosts = sum(receives_);
+    statistics_.owned = n - statistics_.ghosts;
+    check(scene.arrays().total);
+    list_exchanged(stream, scene, at, n);
+  }
+  /// That nothing was lost on the way or came twice, and that both sides expect the same.
+  void check(int total) const {
+    std::int64_t owned = 0;
+    for (const std::int64_t each : ranks_.all(statistics_.owned)) owned += each;
+    if (owned != total)
+      throw BackendError("after a migration the ranks own " + std::to_string(owned) + " of " + std::to_string(total) +
+                         " particles");
+    if (doubled_.download(1)[0] != 0)
+      throw BackendError("rank " + std::to_string(ranks_.rank()) + " has a particle twice after a migration");
+    const std::vector<int> expected = transposed(sends_);
+    for (int r = 0; r < count(); ++r)
+      if (const auto k = static_cast<std::size_t>(r); expected[k] != receives_[k])
+        throw BackendError("rank " + std::to_string(r) + " sends " + std::to_string(expected[k]) + " ghosts to rank " +
+                           std::to_string(ranks_.rank()) + ", which expects " + std::to_string(receives_[k]));
+  }
+  void list_exchanged(Stream& stream, const SceneArrays& scene, const int* at, int n) {
+    const auto out = static_cast<std::size_t>(sum(sends_)), in = static_cast<std::size_t>(sum(receives_));
+    send_.reserve(out);
+    receive_.reserve(in);
+    values_.reserve(std::max(out, in));
+    out_.reserve(out);
+    in_.reserve(in);
+    first_send_.upload(starts(sends_));
+    first_receive_.upload(starts(receives_));
+    for (Buffer<int>* each : {&sends_counted_, &receives_counted_}) stream.fill_zero(each->get(), each->bytes());
+    stream.launch(list_exchanged_kernel, n,
+                  ListExchanged{boxes(), after(scene), at, first_send_.get(), first_receive_.get(),
+                                sends_counted_.get(), receives_counted_.get(), send_.get(), receive_.get()});
+    sort_parts(stream, send_, sends_);
+    sort_parts(stream, receive_, receives_);
+    stream.wait();
+  }
+  void sort_parts(Stream& stream, const Buffer<int>& list, const std::vector<int>& parts) const {
+    int first = 0;
+    for (const int part : parts) {
+      if (part > 1) stream.sort_by_key(list.get() + first, values_.get(), part);
+      first += part;
+    }
+  }
+
+  /// Bits that numbers below n have.
+  static int bits_below(int n) {
+    int bits = 1;
+    while (bits < 31 && (1 << bits) < n) ++bits;
+    return bits;
+  }
+  static std::vector<int> starts(const std::vector<int>& parts) {
+    std::vector<int> first;
+    int at = 0;
+    for (const int part : parts) {
+      first.push_back(at);
+      at += part;
+    }
+    return first;
+  }
+  template <class T>
+  static std::vector<Segment> segments(T* at, const std::vector<int>& parts) {
+    std::vector<Segment> out;
+    for (const int part : parts) {
+      out.push_back({at, static_cast<std::size_t>(part) * sizeof(T)});
+      at += part;
+    }
+    return out;
+  }
+  template <class T>
+  void exchange(Stream& stream, T* out, T* in) {
+    transport_.exchange(stream, segments(out, sends_), segments(in, receives_));
+  }
+
+  Communicator& ranks_;
+  Transport transport_;
+  float margin_of_h_, margin_ = 0;  // m
+  bool fresh_ = false;              // the ghosts that there are suffice for the state that there is
+  Box reach_{};
+  double step_ = 0;  // how far the fastest particle moved in the last substep, m
+  int most_substeps_ = first_substeps;
+  RankStatistics statistics_;
+  Buffer<Box> own_boxes_, reach_boxes_;
+  Buffer<int> global_id_, index_, farthest_;
+  Buffer<unsigned char> ghost_;
+  Buffer<char> scan_, sort_;
+  Buffer<int> departing_, gone_, first_, sends_counted_, receives_counted_, doubled_, first_send_, first_receive_;
+  Buffer<Traveller> travellers_out_, travellers_in_;
+  std::vector<int> sends_, receives_;  // by rank, particles per substep
+  Buffer<int> send_, receive_, values_;
+  Buffer<GhostState> out_, in_;
+};
+
+}  // namespace
+}  // namespace decant::gpu
