@@ -9,6 +9,7 @@ A port is a class derived from Port; conform, fuzz, drift, bench and diff are th
     decant.conform(backend=MyPort).require()
 """
 
+from . import campaign
 from ._decant import BackendError, InputError, Scene
 from .arrays import on_host
 from .command import CommandError, fixture_folder, include_folder, scene_folder
@@ -33,7 +34,7 @@ from .verbs import Campaign, Drift, bench, conform, diff, drift, fuzz
 __all__ = [
     "COUNT_FIELDS", "OFFERS", "REAL_FIELDS", "BackendError", "Bound", "Campaign", "CommandError", "Drift", "Fixture",
     "Given", "InputError", "Lists", "Oracle", "OwnVerdict", "Port", "Pose", "Property", "Report", "Row", "Scene",
-    "StageTimes", "State", "Walls", "bench", "conform", "cut_out", "diagnose", "diff", "drift", "field",
+    "StageTimes", "State", "Walls", "bench", "campaign", "conform", "cut_out", "diagnose", "diff", "drift", "field",
     "fixture_folder", "fuzz", "include_folder", "judge", "kernel_properties", "near_cutoff", "on_host", "pair_sums",
     "properties", "read_columns", "read_fixture", "read_report", "recordings", "repels", "scene_folder", "spread",
     "to_pandas", "write_reference", "write_results",

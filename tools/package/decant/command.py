@@ -49,5 +49,9 @@ def run(arguments: list[str], passes: tuple[int, ...] = (0,)) -> subprocess.Comp
 
 
 def main() -> None:
-    """The console script `decant`."""
+    """The console script `decant`. Campaigns are this package's; every other verb is the command's."""
+    if sys.argv[1:2] == ["campaign"]:
+        from .campaign.command import main as run_campaign
+
+        sys.exit(run_campaign(sys.argv[2:]))
     os.execve(COMMAND, [str(COMMAND), *sys.argv[1:]], environment())
