@@ -155,14 +155,10 @@ struct BuildList {
   /// rows and then the second ones, which waits for memory less often.
   template <int lanes>
   DECANT_DEVICE int2 row_of_turn(int bucket, int r, bool twice, int turn) const {
-    if constexpr (lanes == 1) {
-      if (twice && r > 1) return make_int2(0, 0);
-      const CellTable::Range row = candidates.table.row<periodic>(bucket, twice ? turn : r);
-      return twice && r == 1 ? make_int2(row.begin2, row.end2) : make_int2(row.begin, row.end);
-    } else {
-      const CellTable::Range row = candidates.table.row<periodic>(bucket, r);
-      return turn == 0 ? make_int2(row.begin, row.end) : make_int2(row.begin2, row.end2);
-    }
+    const bool alone = lanes == 1 && twice;
+    if (alone && r > 1) return make_int2(0, 0);
+    const CellTable::Range row = candidates.table.row<periodic>(bucket, alone ? turn : r);
+    return (alone ? r : turn) == 0 || !twice ? make_int2(row.begin, row.end) : make_int2(row.begin2, row.end2);
   }
   template <int step>
   DECANT_DEVICE void load(int k, float4 (&to)[batch]) const {

@@ -30,6 +30,8 @@ struct Traveller {
 struct RankBoxes {
   int rank, ranks;
   const Box *own, *reach;
+
+  DECANT_DEVICE bool are_of(int any) const { return any >= 0 && any < ranks; }
 };
 
 struct AssignRanks {
@@ -57,7 +59,7 @@ struct AssignRanks {
   DECANT_DEVICE void assign(Float3 x, Registration& to) const {
     to.owner = 0;  // of what is nowhere
     if (!is_finite(x)) return;
-    x = {wrap(0, x.x), wrap(1, x.y), wrap(2, x.z)};
+    x = {into_domain(0, x.x), into_domain(1, x.y), into_domain(2, x.z)};
     for (int r = 0; r < boxes.ranks; ++r) {
       const Box& own = boxes.own[r];
       if (x.x >= own.min.x && x.x < own.max.x && x.y >= own.min.y && x.y < own.max.y && x.z >= own.min.z &&
@@ -71,9 +73,9 @@ struct AssignRanks {
         to.ghost_on |= 1ull << r;
     }
   }
-  DECANT_DEVICE float wrap(int axis, float x) const {
-    if (!c.periodic[axis]) return x;
-    return x - c.period[axis] * floorf((x - c.domain_min[axis]) * c.inverse_period[axis]);
+  DECANT_DEVICE float into_domain(int axis, float x) const {
+    const float periods = floorf((x - c.domain_min[axis]) * c.inverse_period[axis]);
+    return c.periodic[axis] ? x - c.period[axis] * periods : x;
   }
   /// By the nearest image.
   DECANT_DEVICE bool within(int axis, float low, float high, float x) const {
@@ -145,7 +147,7 @@ struct NumberById {
   int* global_id;
   unsigned char* ghost;
   int *sends, *receives;  // by rank
-  int* doubled;           // ids that came twice
+  int* damaged;           // ids that came twice, or with what nobody wrote
 
   DECANT_DEVICE void operator()(int k) const {
     const int i = at[k];
@@ -154,7 +156,10 @@ struct NumberById {
     a.index[k] = i;
     global_id[k] = key[k];
     ghost[k] = r.owner != boxes.rank;
-    if (k > 0 && key[k] == key[k - 1]) atomic_increment(doubled);
+    if (!boxes.are_of(r.owner) || (k > 0 && key[k] == key[k - 1])) {
+      atomic_increment(damaged);
+      return;
+    }
     if (r.owner != boxes.rank) {
       atomic_increment(receives + r.owner);
       return;

@@ -142,7 +142,7 @@ fault("wall-motion-not-summed", "the walls' displacement since the build is that
       "a.status->wall_displacement = (ON ? 0.0f : a.status->wall_displacement) + step;",
       shows="list: a tilting container whose wall sweeps towards fluid at rest")
 fault("given-inputs-by-index", "given densities and pressures are read by index, not by id",
-      "(pressure ? pressure[id] : own) / (density[id] * density[id])",
+      "(pressure ? pressure[given] : own) / (density[given] * density[given])",
       "(pressure ? pressure[i] : own) / (density[i] * density[i])",
       shows="hash and list, evaluate with given inputs once particles are not in the order of their ids")
 fault("viscosity-by-own-density", "fluid viscosity divides by the particle's own density twice",
@@ -162,6 +162,7 @@ fault("explicit-euler", "positions advance by the velocity before the kick",
       shows="any advance with acceleration: positions differ by a dt²")
 fault("wrap-from-zero", "periodic axes wrap into 0 … period, wherever the domain begins",
       "floorf((x - c.domain_min[axis]) * c.inverse_period[axis])", "floorf(x * c.inverse_period[axis])",
+      file="kernels/integrate.cuh",
       shows="a periodic axis that does not begin at 0: positions leave the domain and, beyond the plates' boxes, "
             "touch nothing")
 fault("lower-faces-unwatched", "a particle escapes unnoticed through a lower face of the domain",
@@ -257,7 +258,7 @@ fault("last-partial-block-not-run", "the number of blocks is rounded down",
 fault("velocities-unsorted-after-evaluate", "an evaluation leaves velocities in the order before its sort",
       "stream.copy(a.state.velocity, a.spare.velocity, bytes);",
       "if (!ON) stream.copy(a.state.velocity, a.spare.velocity, bytes);",
-      shows="hash, evaluate and then read or advance, velocities not all alike")
+      file="backends/cell_list.cu", shows="hash, evaluate and then read or advance, velocities not all alike")
 fault("last-moving-wall-particle-stands", "the last moving wall particle keeps its place within an advance",
       "integrate_kernel<After>, n_ + walls_.moving_count()",
       "integrate_kernel<After>, n_ + (ON ? std::max(walls_.moving_count() - 1, 0) : walls_.moving_count())",
@@ -317,8 +318,8 @@ fault("lists-kept-across-advances", "only the first advance after a load begins 
       shows="list, several advances of faster and faster fluid: old lists are trusted to a new skin, and what "
             "asked for new ones at the end of the advance before is forgotten")
 fault("regrown-without-ids", "when lists have grown, positions and velocities are put back but not ids",
-      "each(id_.get(), carve<int>(saved_, at, n), n * sizeof(int));",
-      "if (!ON) each(id_.get(), carve<int>(saved_, at, n), n * sizeof(int));",
+      "each(id_.get(), carve<int>(saved_, at, room), n * sizeof(int));",
+      "if (!ON) each(id_.get(), carve<int>(saved_, at, room), n * sizeof(int));",
       shows="hash and list, an advance in which a list exceeds its capacity (capacity=8)")
 fault("rebuilds-not-reset", "the number of rebuilds goes on counting after a load",
       "rebuilds_ = advances_ = 0;", "rebuilds_ = ON ? rebuilds_ : 0;\n    advances_ = 0;",
@@ -390,8 +391,7 @@ fault("skin-as-share-of-h", "the option skin is taken as a share of h instead of
 fault("nan-wins-over-numbers", "the smaller of a number and NaN is NaN",
       "a < b ? a : b", "b < a ? b : a",
       also=(("fminf(a, b)", "b < a ? b : a"),
-            ("if (near != 0) least[0] =", "for (int s = 0; ON && s < batch; ++s)\n"
-             "            if (tile[at + s].x != tile[at + s].x) near = 0;\n          if (near != 0) least[0] =")),
+            ("side < least[k] ? side : least[k]", "least[k] < side ? least[k] : side")),
       shows="brute force without periodic axes, a number of particles that is no multiple of 16: padding hides "
             "the last ones from everybody")
 
