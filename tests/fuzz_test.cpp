@@ -192,7 +192,13 @@ TEST(Campaign, EndsWhereItIsToldToAndKeepsWhatItHas) {
   s.stop = [&] { return ++asked > 5; };
   const Campaign c = run_campaign(s, on_host);
   EXPECT_EQ(c.cases, 5);
-  s.stop = nullptr;
+  // One of many threads is told: all end, and no seed before the last one is left out.
+  s.cases = 60;
+  s.threads = 8;
+  asked = 0;
+  s.stop = [&] { return ++asked == 6; };
+  EXPECT_EQ(run_campaign(s, on_host).cases, 5);
+  s = settings_of(-1, {"fields"});
   s.seconds = 0.5;
   EXPECT_GE(run_campaign(s, on_host).cases, 1);
 }

@@ -19,6 +19,7 @@
 #include <exception>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 namespace decant::fuzz {
@@ -62,15 +63,20 @@ class Running {
            (s_.stop && s_.stop());
   }
 
+  /// The next case, which whoever gets it does. Whether there is one is asked while none is given out: seeds before
+  /// the last one must not be left behind.
+  std::optional<std::int64_t> next_case() {
+    const std::lock_guard lock(next_mutex_);
+    if (over(next_)) ended_ = true;
+    return ended_ ? std::nullopt : std::optional(next_++);
+  }
+
   void work() {
     try {
       if (s_.one_core_each) omp_set_num_threads(1);
       Tester tester(s_.backends, s_.properties, make_, s_.every_case);
-      for (;;) {
-        // Seeds are consecutive: whoever takes one has it done.
-        const std::int64_t k = next_.fetch_add(1);
-        if (over(k)) break;
-        const std::uint64_t seed = s_.first_seed + static_cast<std::uint64_t>(k);
+      while (const std::optional<std::int64_t> k = next_case()) {
+        const std::uint64_t seed = s_.first_seed + static_cast<std::uint64_t>(*k);
         const Case fuzz_case = random_case(seed);
         const Fixture fixture = fixture_of(fuzz_case, fmt::format("fuzz-{}", seed));
         const std::vector<Outcome> outcomes = tester.test(fixture, seed);
@@ -130,9 +136,9 @@ class Running {
   const Settings& s_;
   const BackendMaker& make_;
   Clock::time_point start_ = Clock::now(), told_ = start_;
-  std::atomic<std::int64_t> next_{0};
+  std::int64_t next_ = 0;  // case
   std::atomic<bool> ended_{false};
-  std::mutex mutex_;
+  std::mutex mutex_, next_mutex_;
   std::map<std::pair<std::string, std::string>, PropertyStatistics> statistics_;  // by property and backend
   std::set<std::string> minimised_;
   Campaign all_;

@@ -107,6 +107,22 @@ Checkpoint read_checkpoint(const std::filesystem::path& file) {
   return c;
 }
 
+namespace {
+
+/// Options of a backend but for the number of its ranks, which may be another one for each part of a pour.
+std::string without_ranks(const std::string& options) {
+  std::string kept;
+  for (std::size_t at = 0; at < options.size();) {
+    const std::size_t end = std::min(options.find(':', at), options.size());
+    const std::string item = options.substr(at, end - at);
+    if (!item.starts_with("ranks=")) kept += (kept.empty() ? "" : ":") + item;
+    at = end + 1;
+  }
+  return kept;
+}
+
+}  // namespace
+
 void check_same_pour(const std::filesystem::path& file, const Checkpoint& checkpoint, const Scene& scene,
                      const BackendInfo& backend, const Choices& choices) {
   const auto refuse = [&](const std::string& key, const std::string& now, const std::string& then) {
@@ -124,7 +140,7 @@ void check_same_pour(const std::filesystem::path& file, const Checkpoint& checkp
   }
   const BackendInfo& then = checkpoint.backend;
   if (backend.name != then.name) refuse("--backend", backend.name, then.name);
-  if (backend.options != then.options)
+  if (without_ranks(backend.options) != without_ranks(then.options))
     refuse("backend options", "\"" + backend.options + "\"", "\"" + then.options + "\"");
   if (backend.executor != then.executor) refuse("--executor", backend.executor, then.executor);
   const Choices& chosen = checkpoint.choices;
