@@ -62,8 +62,8 @@ concept NeighborSearch =
 
 /// A search whose particles may be a rank's own and ghosts, so many of them within a box now, and others elsewhere after the next
 /// migration.
-/// Its `integrate` calls exchange(after) when all particles have moved, with what it does at each new position
-/// (Integrate::after); ghosts have theirs when that returns.
+/// Its `integrate` takes an exchange (NoExchange of kernels/exchange.cuh) and calls start(Integrate) before it moves
+/// the particles, and finish(Integrate::after) after that.
 template <class Search>
 concept RankSearch = NeighborSearch<Search> && requires(Search search, Stream& stream, int n, const Box& where) {
   search.set_particles(stream, n, where);

@@ -95,9 +95,10 @@ class CellList {
                  const Exchange& exchange = {}) {
     const auto launch = [&](const auto& after) {
       using After = std::decay_t<decltype(after)>;
-      stream.launch(integrate_kernel<After>, n_ + walls_.moving_count(), Integrate<After>{c_, a, geometry, after},
-                    walls_.moving(a));
-      exchange(after);
+      const Integrate<After> integrate{c_, a, geometry, after};
+      exchange.start(integrate);
+      stream.launch(integrate_kernel<After>, n_ + walls_.moving_count(), integrate, walls_.moving(a));
+      exchange.finish(after);
     };
     if (counts_ahead()) launch(CountForNextSort{fluid_.counter(fluid_source(a), scratch_)});
     else launch(NothingElse{});

@@ -95,9 +95,10 @@ class NeighborList {
     using Check = CheckDisplacement<periodic>;
     const RebuildCriterion w = rebuild_criterion(next_rebuild);
     const Check check{c_, a, w};
-    stream.launch(integrate_kernel<Check>, n_ + walls_.moving_count(), Integrate<Check>{c_, a, geometry, check},
-                  walls_.moving(a));
-    exchange(check);
+    const Integrate<Check> integrate{c_, a, geometry, check};
+    exchange.start(integrate);
+    stream.launch(integrate_kernel<Check>, n_ + walls_.moving_count(), integrate, walls_.moving(a));
+    exchange.finish(check);
     if (w.criterion == Criterion::relative)
       stream.launch(compare_displacement_boxes_kernel, w.supers, CompareDisplacementBoxes{w, a.status});
   }

@@ -7,13 +7,18 @@
 
 namespace decant::gpu {
 
+/// Pairs of a key and a value, and room for as many.
+struct Pairs {
+  int *key, *other_key, *value, *other_value;
+};
+
 namespace host {
 /// out[k] = in[0] + … + in[k−1], k < n. No scratch memory is needed.
 void exclusive_scan(const int* in, int* out, int n);
 /// Stable.
 void sort_by_key(int* keys, int* values, int n);
-/// The same from one pair of arrays to another, of keys in 0 … 2^bits − 1.
-void sort_pairs(const int* keys, int* sorted_keys, const int* values, int* sorted_values, int n, int bits);
+/// Stable, of keys in 0 … 2^bits − 1; `key` and `value` are the sorted ones afterwards.
+void sort_pairs(Pairs& pairs, int n, int bits);
 /// out[k] = how many of the sorted keys are below k, k < count.
 void lower_bounds(const int* keys, int n, int* out, int count);
 }  // namespace host
@@ -24,9 +29,8 @@ void exclusive_scan(const int* in, int* out, int n, void* scratch, std::size_t b
 std::size_t scan_bytes(int n);
 /// Allocates, so it cannot be captured in a graph.
 void sort_by_key(int* keys, int* values, int n, void* stream);
-/// `scratch` holds sort_bytes(n, bits) bytes.
-void sort_pairs(const int* keys, int* sorted_keys, const int* values, int* sorted_values, int n, int bits,
-                void* scratch, std::size_t bytes, void* stream);
+/// `scratch` holds sort_bytes(n, bits) bytes, which are few.
+void sort_pairs(Pairs& pairs, int n, int bits, void* scratch, std::size_t bytes, void* stream);
 std::size_t sort_bytes(int n, int bits);
 void lower_bounds(const int* keys, int n, int* out, int count, void* stream);
 }  // namespace cuda

@@ -25,17 +25,17 @@ void sort_by_key(int* keys, int* values, int n, void* stream) {
   thrust::stable_sort_by_key(thrust::cuda::par.on(static_cast<cudaStream_t>(stream)), keys, keys + n, values);
 }
 
-void sort_pairs(const int* keys, int* sorted_keys, const int* values, int* sorted_values, int n, int bits,
-                void* scratch, std::size_t bytes, void* stream) {
-  CUDA_CHECK(cub::DeviceRadixSort::SortPairs(scratch, bytes, keys, sorted_keys, values, sorted_values, n, 0, bits,
-                                             static_cast<cudaStream_t>(stream)));
+void sort_pairs(Pairs& pairs, int n, int bits, void* scratch, std::size_t bytes, void* stream) {
+  cub::DoubleBuffer<int> keys(pairs.key, pairs.other_key), values(pairs.value, pairs.other_value);
+  CUDA_CHECK(
+      cub::DeviceRadixSort::SortPairs(scratch, bytes, keys, values, n, 0, bits, static_cast<cudaStream_t>(stream)));
+  pairs = {keys.Current(), keys.Alternate(), values.Current(), values.Alternate()};
 }
 
 std::size_t sort_bytes(int n, int bits) {
   std::size_t bytes = 0;
-  const int* in = nullptr;
-  int* out = nullptr;
-  CUDA_CHECK(cub::DeviceRadixSort::SortPairs(nullptr, bytes, in, out, in, out, n, 0, bits));
+  cub::DoubleBuffer<int> none(nullptr, nullptr);
+  CUDA_CHECK(cub::DeviceRadixSort::SortPairs(nullptr, bytes, none, none, n, 0, bits));
   return bytes;
 }
 

@@ -1,7 +1,6 @@
 #include "gpu/core/algorithms.hpp"
 
 #include <thrust/binary_search.h>
-#include <thrust/copy.h>
 #include <thrust/iterator/counting_iterator.h>
 #include <thrust/scan.h>
 #include <thrust/sort.h>
@@ -15,11 +14,7 @@ void sort_by_key(int* keys, int* values, int n) {
   thrust::stable_sort_by_key(thrust::omp::par, keys, keys + n, values);
 }
 
-void sort_pairs(const int* keys, int* sorted_keys, const int* values, int* sorted_values, int n, int) {
-  thrust::copy(thrust::omp::par, keys, keys + n, sorted_keys);
-  thrust::copy(thrust::omp::par, values, values + n, sorted_values);
-  sort_by_key(sorted_keys, sorted_values, n);
-}
+void sort_pairs(Pairs& pairs, int n, int) { sort_by_key(pairs.key, pairs.value, n); }
 
 void lower_bounds(const int* keys, int n, int* out, int count) {
   thrust::lower_bound(thrust::omp::par, keys, keys + n, thrust::counting_iterator<int>(0),

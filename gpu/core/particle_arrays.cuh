@@ -23,6 +23,9 @@ struct Particles {
   float4 *position, *velocity;
 };
 
+/// On one rank of several: its own and nobody else's business; its own, of which others have copies; such a copy.
+enum class ParticleRole : unsigned char { interior, border, ghost };
+
 struct ParticleArrays {
   int n;                   // fluid particles
   int room;                // how many there may be
@@ -42,13 +45,15 @@ struct ParticleArrays {
   const DevicePose* poses;  // [(substeps + 1) × containers], substep major
   int containers;
   // Where several ranks share a problem: ids are of this rank, in the order of the problem's. Null elsewhere.
-  const int* global_id;        // by id, the problem's
-  const unsigned char* ghost;  // by id, 1: a copy of another rank's particle
-  int* index;                  // by id, where it is in the order in which kernels run
-  int* farthest;               // by substep of the advance, |displacement|² of what moves farthest, float bits
+  const int* global_id;      // by id, the problem's
+  const ParticleRole* role;  // by id
+  int* index;                // by id, where it is in the order in which kernels run
+  int* farthest;             // by substep of the advance, |displacement|² of what moves farthest, float bits
 
   bool on_ranks() const { return global_id != nullptr; }
-  DECANT_DEVICE bool is_ghost(int i) const { return ghost && ghost[id[i]]; }
+  DECANT_DEVICE bool is_ghost(int i) const { return role && role[id[i]] == ParticleRole::ghost; }
+  /// Whether the integration of all particles leaves it alone: others move it, or it has moved before.
+  DECANT_DEVICE bool moves_apart(int i) const { return role && role[id[i]] != ParticleRole::interior; }
   DECANT_DEVICE int problem_id(int own) const { return global_id ? global_id[own] : own; }
 
   /// At the start of the substep, for all that comes before integration, and at its end, for all that

@@ -81,10 +81,10 @@ class Stream {
     if (scratch.bytes() < bytes) scratch.resize(bytes);
   }
   void sort_by_key(int* keys, int* values, int n) { cuda::sort_by_key(keys, values, n, stream_); }
-  void sort_pairs(const int* keys, int* sorted_keys, const int* values, int* sorted_values, int n, int bits,
-                  Buffer<char>& scratch) {
+  void sort_pairs(Pairs& pairs, int n, int bits, Buffer<char>& scratch) {
+    if (n <= 0) return;
     scratch.reserve(cuda::sort_bytes(n, bits));
-    cuda::sort_pairs(keys, sorted_keys, values, sorted_values, n, bits, scratch.get(), scratch.bytes(), stream_);
+    cuda::sort_pairs(pairs, n, bits, scratch.get(), scratch.bytes(), stream_);
   }
   void lower_bounds(const int* keys, int n, int* out, int count) { cuda::lower_bounds(keys, n, out, count, stream_); }
 
@@ -240,10 +240,7 @@ class Stream {
   void exclusive_scan(const int* in, int* out, int n, Buffer<char>&) { host::exclusive_scan(in, out, n); }
   static void reserve_scan(int, Buffer<char>&) {}
   void sort_by_key(int* keys, int* values, int n) { host::sort_by_key(keys, values, n); }
-  void sort_pairs(const int* keys, int* sorted_keys, const int* values, int* sorted_values, int n, int bits,
-                  Buffer<char>&) {
-    host::sort_pairs(keys, sorted_keys, values, sorted_values, n, bits);
-  }
+  void sort_pairs(Pairs& pairs, int n, int bits, Buffer<char>&) { host::sort_pairs(pairs, n, bits); }
   void lower_bounds(const int* keys, int n, int* out, int count) { host::lower_bounds(keys, n, out, count); }
   template <class Then>
   void when(const int* flag, Branch, Then then) {

@@ -10,10 +10,13 @@
 namespace decant::gpu {
 namespace {
 
-/// What else a search wants after an integration: nothing, where there is one rank.
+/// What ranks do around an integration: nothing, where there is one. `start` moves what others wait for and sends it;
+/// after `finish` ghosts are where they are now.
 struct NoExchange {
+  template <class Integrate>
+  void start(const Integrate&) const {}
   template <class After>
-  void operator()(const After&) const {}
+  void finish(const After&) const {}
 };
 
 /// What neighbors read of a particle in the force kernel beside its state.

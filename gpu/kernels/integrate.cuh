@@ -29,10 +29,6 @@ struct Integrate {
   static constexpr bool by_team = true;
   template <class Team>
   DECANT_DEVICE void operator()(const Team& team, int i, Float3 x, Float3 v, Float3 acceleration) const {
-    if (a.is_ghost(i)) {  // moved by its own rank
-      if (i == 0 && team.is_leader()) ++a.status->substeps_ended;
-      return;
-    }
     const auto prefetched = after.prefetch(i);
     const float old_clearance = a.current.velocity[i].w, wall_step = a.status->wall_step;
     v = v + c.dt * acceleration;
@@ -73,6 +69,12 @@ struct Integrate {
   }
 };
 
+template <class After>
+DECANT_DEVICE void integrate_stored(const Integrate<After>& integrate, int i) {
+  const ParticleArrays& a = integrate.a;
+  integrate(SubWarp<1>(i), i, xyz(a.force_position[i]), xyz(a.force_velocity[i]), xyz(a.acceleration[i]));
+}
+
 /// By the accelerations that were stored; threads after the particles' place moving walls at the end of the
 /// substep.
 template <class After>
@@ -81,8 +83,16 @@ integrate_kernel(int particles_and_walls, Integrate<After> integrate, PlaceWalls
   for_each_thread(particles_and_walls, [&](int i) {
     const ParticleArrays& a = integrate.a;
     if (i >= a.n) return walls(i - a.n);
-    integrate(SubWarp<1>(i), i, xyz(a.force_position[i]), xyz(a.force_velocity[i]), xyz(a.acceleration[i]));
+    if (!a.moves_apart(i)) integrate_stored(integrate, i);
+    else if (i == 0 && a.is_ghost(i)) ++a.status->substeps_ended;
   });
+}
+
+/// The same of particles by their ids, before the others: they can be on their way to other ranks meanwhile.
+template <class After>
+DECANT_KERNEL(256)
+integrate_border_kernel(int n, const int* ids, Integrate<After> integrate) {
+  for_each_thread(n, [&](int k) { integrate_stored(integrate, integrate.a.index[ids[k]]); });
 }
 
 }  // namespace

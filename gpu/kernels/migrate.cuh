@@ -138,16 +138,40 @@ struct KeyById {
 };
 DECANT_KERNEL(256) key_by_id_kernel(int n, KeyById make) { for_each_thread(n, make); }
 
-/// After the sort: ids of this rank, and how much it exchanges with each other one in a substep.
+/// How many particles a rank exchanges with each other one in a substep, and how many have copies anywhere.
+struct CountExchanged {
+  RankBoxes boxes;
+  const Registration* registrations;
+  int *sends, *receives;  // by rank
+  int* border;
+  int* damaged;  // particles with what nobody wrote
+
+  DECANT_DEVICE void operator()(int i) const {
+    const Registration r = registrations[i];
+    if (!boxes.are_of(r.owner)) atomic_increment(damaged);
+    else if (r.owner != boxes.rank) atomic_increment(receives + r.owner);
+    else if (r.ghost_on != 0) {
+      atomic_increment(border);
+      for (int to = 0; to < boxes.ranks; ++to)
+        if (r.ghost_on >> to & 1) atomic_increment(sends + to);
+    }
+  }
+};
+DECANT_KERNEL(256) count_exchanged_kernel(int n, CountExchanged count) { for_each_thread(n, count); }
+
+/// After the sort: ids of this rank, and the lists of what is exchanged, rank by rank; they are sorted afterwards.
 struct NumberById {
   ParticleArrays a;
   RankBoxes boxes;
   const Registration* registrations;
   const int *key, *at;
   int* global_id;
-  unsigned char* ghost;
-  int *sends, *receives;  // by rank
-  int* damaged;           // ids that came twice, or with what nobody wrote
+  ParticleRole* role;
+  const int *first_send, *first_receive;  // by rank, where its entries begin
+  int *sent, *received;                   // by rank, how many are there
+  int *send, *receive;
+  int *bordering, *border;  // how many are there; ids in any order
+  int* doubled;             // ids that came twice
 
   DECANT_DEVICE void operator()(int k) const {
     const int i = at[k];
@@ -155,41 +179,21 @@ struct NumberById {
     a.id[i] = k;
     a.index[k] = i;
     global_id[k] = key[k];
-    ghost[k] = r.owner != boxes.rank;
-    if (!boxes.are_of(r.owner) || (k > 0 && key[k] == key[k - 1])) {
-      atomic_increment(damaged);
-      return;
-    }
-    if (r.owner != boxes.rank) {
-      atomic_increment(receives + r.owner);
-      return;
-    }
-    for (int to = 0; to < boxes.ranks; ++to)
-      if (r.ghost_on >> to & 1) atomic_increment(sends + to);
-  }
-};
-DECANT_KERNEL(256) number_by_id_kernel(int n, NumberById number) { for_each_thread(n, number); }
-
-/// The lists of what is exchanged, rank by rank; they are sorted afterwards.
-struct ListExchanged {
-  RankBoxes boxes;
-  const Registration* registrations;
-  const int* at;
-  const int *first_send, *first_receive;  // by rank, where its entries begin
-  int *sent, *received;                   // by rank, how many are there
-  int *send, *receive;
-
-  DECANT_DEVICE void operator()(int k) const {
-    const Registration r = registrations[at[k]];
+    role[k] = r.owner != boxes.rank ? ParticleRole::ghost
+              : r.ghost_on != 0     ? ParticleRole::border
+                                    : ParticleRole::interior;
+    if (k > 0 && key[k] == key[k - 1]) atomic_increment(doubled);
     if (r.owner != boxes.rank) {
       receive[first_receive[r.owner] + atomic_increment(received + r.owner)] = k;
       return;
     }
+    if (r.ghost_on == 0) return;
+    border[atomic_increment(bordering)] = k;
     for (int to = 0; to < boxes.ranks; ++to)
       if (r.ghost_on >> to & 1) send[first_send[to] + atomic_increment(sent + to)] = k;
   }
 };
-DECANT_KERNEL(256) list_exchanged_kernel(int n, ListExchanged list) { for_each_thread(n, list); }
+DECANT_KERNEL(256) number_by_id_kernel(int n, NumberById number) { for_each_thread(n, number); }
 
 /// Of the particles that a rank owns: samples of where they are, and how fast the fastest is. Which are samples is
 /// told by their ids, so that all ranks together take the same ones however they share the particles.

@@ -19,6 +19,20 @@ class Transport {
 #ifdef __CUDACC__
     if (!ranks.asked_for_devices) ranks.between_devices = cuda::make_nccl_exchange(ranks);
     ranks.asked_for_devices = true;
+    int least = 0, most = 0;
+    CUDA_CHECK(cudaDeviceGetStreamPriorityRange(&least, &most));
+    CUDA_CHECK(cudaStreamCreateWithPriority(&beside_, cudaStreamNonBlocking, most));
+    for (cudaEvent_t* event : {&packed_, &received_})
+      CUDA_CHECK(cudaEventCreateWithFlags(event, cudaEventDisableTiming));
+#endif
+  }
+  Transport(const Transport&) = delete;
+  Transport& operator=(const Transport&) = delete;
+  ~Transport() {
+#ifdef __CUDACC__
+    cudaStreamDestroy(beside_);
+    cudaEventDestroy(packed_);
+    cudaEventDestroy(received_);
 #endif
   }
 
@@ -42,6 +56,30 @@ class Transport {
 #endif
   }
 
+  /// The same beside what the stream does until `finish`, where that is between devices.
+  void start([[maybe_unused]] Stream& stream, std::vector<Segment> send, std::vector<Segment> receive) {
+#ifdef __CUDACC__
+    if (ranks_.between_devices) {
+      CUDA_CHECK(cudaEventRecord(packed_, stream.handle()));
+      CUDA_CHECK(cudaStreamWaitEvent(beside_, packed_));
+      ranks_.between_devices->exchange(send, receive, beside_);
+      CUDA_CHECK(cudaEventRecord(received_, beside_));
+      return;
+    }
+#endif
+    send_ = std::move(send);
+    receive_ = std::move(receive);
+  }
+  void finish(Stream& stream) {
+#ifdef __CUDACC__
+    if (ranks_.between_devices) {
+      CUDA_CHECK(cudaStreamWaitEvent(stream.handle(), received_));
+      return;
+    }
+#endif
+    exchange(stream, send_, receive_);
+  }
+
  private:
 #ifdef __CUDACC__
   static std::vector<Segment> staged(std::span<const Segment> segments, PinnedBuffer& memory) {
@@ -56,7 +94,10 @@ class Transport {
     return out;
   }
   PinnedBuffer out_, in_;
+  cudaStream_t beside_ = nullptr;
+  cudaEvent_t packed_ = nullptr, received_ = nullptr;
 #endif
+  std::vector<Segment> send_, receive_;  // begun
   Communicator& ranks_;
 };
 

@@ -9,6 +9,7 @@
 
 #include "gpu/kernels/cell_sort.cuh"
 #include "gpu/kernels/exchange.cuh"
+#include "gpu/kernels/integrate.cuh"
 #include "gpu/kernels/migrate.cuh"
 #include "gpu/ranks/partition.hpp"
 #include "gpu/ranks/transport.cuh"
@@ -39,7 +40,7 @@ class Halo {
     statistics_ = {};
     reserve(scene.room());
     global_id_.upload(problem.id);
-    ghost_.upload(std::vector<unsigned char>(problem.id.size(), 0));
+    role_.upload(std::vector<ParticleRole>(problem.id.size(), ParticleRole::interior));
     step_ = 0;
     place_boxes(problem.constants, problem.rank_boxes, problem.particles);
     statistics_.owned = static_cast<std::int64_t>(problem.id.size());
@@ -47,7 +48,7 @@ class Halo {
 
   void attach(ParticleArrays& a) const {
     a.global_id = global_id_.get();
-    a.ghost = ghost_.get();
+    a.role = role_.get();
     a.index = index_.get();
     a.farthest = farthest_.get();
   }
@@ -65,9 +66,9 @@ class Halo {
     const std::vector<int> arriving = transposed(departing);
     const int arrivals = std::accumulate(arriving.begin(), arriving.end(), 0);
     if (kept + arrivals > scene.room()) {
-      scene.grow(kept + arrivals + (kept + arrivals) / 20 + tile_size);
+      scene.grow(kept + arrivals + (kept + arrivals) / 50 + tile_size);
       global_id_.grow(static_cast<std::size_t>(scene.room()), static_cast<std::size_t>(scene.particles()));
-      ghost_.grow(static_cast<std::size_t>(scene.room()), static_cast<std::size_t>(scene.particles()));
+      role_.grow(static_cast<std::size_t>(scene.room()), static_cast<std::size_t>(scene.particles()));
       reserve(scene.room());
       reload();
       assign(stream, scene);
@@ -87,7 +88,8 @@ class Halo {
 
   /// How many substeps may be tried, of so many that are wanted.
   int substeps_to_try(Stream& stream, int wanted) {
-    const double fit = step_ > 0 ? std::floor(0.5 * margin_ / (1.1 * step_)) + 1 : wanted;
+    // Whatever else happens, everything may fall freely: k step + ½ k² fall is half the margin.
+    const double b = 1.1 * step_, fit = std::floor(margin_ / (b + std::sqrt(b * b + fall_ * margin_) + 1e-30)) + 1;
     const int count = static_cast<int>(std::clamp<double>(fit, 1, std::min(wanted, most_substeps_)));
     farthest_.reserve(static_cast<std::size_t>(count));
     stream.fill_zero(farthest_.get(), static_cast<std::size_t>(count) * sizeof(int));
@@ -121,18 +123,25 @@ class Halo {
     exchange(stream, out, in);
     stream.launch(unpack_densities_kernel, sum(receives_), UnpackDensities{a, receive_.get(), in});
   }
+  /// Moves what other ranks have copies of and sends it; whatever is launched before `finish` runs meanwhile.
+  template <class Integrate>
+  void start_states(Stream& stream, const ParticleArrays& a, const Integrate& integrate) {
+    stream.launch(integrate_border_kernel<decltype(integrate.after)>, borders_, border_.get(), integrate);
+    stream.launch(pack_states_kernel, sum(sends_), PackStates{a, send_.get(), out_.get()});
+    transport_.start(stream, segments(out_.get(), sends_), segments(in_.get(), receives_));
+  }
   /// \param after  Integrate::after
   template <class After>
-  void exchange_states(Stream& stream, const ParticleArrays& a, const After& after) {
-    stream.launch(pack_states_kernel, sum(sends_), PackStates{a, send_.get(), out_.get()});
-    exchange(stream, out_.get(), in_.get());
+  void finish_states(Stream& stream, const ParticleArrays& a, const After& after) {
+    transport_.finish(stream);
     stream.launch(unpack_states_kernel<After>, sum(receives_),
                   UnpackStates<After>{a, receive_.get(), in_.get(), after});
   }
 
   RankRows rows(int n) const {
-    RankRows rows{global_id_.download(static_cast<std::size_t>(n)), ghost_.download(static_cast<std::size_t>(n))};
-    for (unsigned char& is : rows.owned) is = is ? 0 : 1;
+    RankRows rows{global_id_.download(static_cast<std::size_t>(n)), {}};
+    for (const ParticleRole role : role_.download(static_cast<std::size_t>(n)))
+      rows.owned.push_back(role == ParticleRole::ghost ? 0 : 1);
     return rows;
   }
   /// The problem's id of one of this rank's.
@@ -143,13 +152,13 @@ class Halo {
     return global;
   }
   std::size_t bytes() const {
-    return global_id_.bytes() + ghost_.bytes() + index_.bytes() + farthest_.bytes() + send_.bytes() + receive_.bytes() +
-           values_.bytes() + scan_.bytes() + sort_.bytes() + travellers_out_.bytes() + travellers_in_.bytes() +
-           out_.bytes() + in_.bytes();
+    return global_id_.bytes() + role_.bytes() + border_.bytes() + index_.bytes() + farthest_.bytes() + send_.bytes() +
+           receive_.bytes() + 3 * spare_[0].bytes() + scan_.bytes() + sort_.bytes() + travellers_out_.bytes() +
+           travellers_in_.bytes() + out_.bytes() + in_.bytes();
   }
 
  private:
-  static constexpr int first_substeps = 16, most_tried = 256;
+  static constexpr int first_substeps = 64, most_tried = 256;
   static constexpr double most_imbalance = 1.08;
   static constexpr int samples = 4096;  // per rank
 
@@ -161,10 +170,11 @@ class Halo {
     const auto n = static_cast<std::size_t>(room);
     for (Buffer<int>* each : {&global_id_, &index_})
       if (each->size() < n) each->resize(n);
-    if (ghost_.size() < n) ghost_.resize(n);
+    if (role_.size() < n) role_.resize(n);
     for (Buffer<int>* each :
          {&departing_, &gone_, &first_, &sends_counted_, &receives_counted_, &first_send_, &first_receive_})
       each->resize(most_ranks);
+    bordering_.resize(1);
     damaged_.resize(1);
   }
   /// What each other rank has for this one, where `own` is what this one has for each.
@@ -231,8 +241,8 @@ class Halo {
     const std::vector<int> counted = found.download(2);
     float square = 0;
     std::memcpy(&square, &counted[1], sizeof square);
-    step_ = c.dt * (std::sqrt(square) + c.dt * std::sqrt(c.gravity.x * c.gravity.x + c.gravity.y * c.gravity.y +
-                                                         c.gravity.z * c.gravity.z));
+    fall_ = c.dt * c.dt * std::sqrt(c.gravity.x * c.gravity.x + c.gravity.y * c.gravity.y + c.gravity.z * c.gravity.z);
+    step_ = c.dt * std::sqrt(square) + fall_;
     for (const double other : ranks_.all(step_)) step_ = std::max(step_, other);
     const auto n = static_cast<std::size_t>(std::min(counted[0], room));
     const std::vector<float4> x = position.download(n);
@@ -314,28 +324,48 @@ class Halo {
     scene.set_particles(n);
     ParticleArrays a = scene.arrays();
     attach(a);
-    int *key = ints(a, 2), *at = ints(a, 3);
-    stream.launch(key_by_id_kernel, n, KeyById{after(scene), ints(a, 0), ints(a, 1)});
-    stream.sort_pairs(ints(a, 0), key, ints(a, 1), at, n, bits_below(a.total), sort_);
-    for (Buffer<int>* each : {&sends_counted_, &receives_counted_, &damaged_})
+    for (Buffer<int>* each : {&sends_counted_, &receives_counted_, &bordering_, &damaged_})
       stream.fill_zero(each->get(), each->bytes());
-    stream.launch(number_by_id_kernel, n,
-                  NumberById{a, boxes(), after(scene), key, at, global_id_.get(), ghost_.get(), sends_counted_.get(),
-                             receives_counted_.get(), damaged_.get()});
+    stream.launch(count_exchanged_kernel, n,
+                  CountExchanged{boxes(), after(scene), sends_counted_.get(), receives_counted_.get(), bordering_.get(),
+                                 damaged_.get()});
+    stream.launch(key_by_id_kernel, n, KeyById{after(scene), ints(a, 0), ints(a, 2)});
+    Pairs pairs{ints(a, 0), ints(a, 1), ints(a, 2), ints(a, 3)};
+    stream.sort_pairs(pairs, n, bits_below(a.total), sort_);
     stream.wait();
     sends_ = counts(sends_counted_);
     receives_ = counts(receives_counted_);
+    borders_ = bordering_.download(1)[0];
     statistics_.ghosts = sum(receives_);
     statistics_.owned = n - statistics_.ghosts;
-    check(scene.arrays().total);
-    list_exchanged(stream, scene, at, n);
+    check(a.total);
+    reserve_exchange();
+    stream.fill_zero(sends_counted_.get(), sends_counted_.bytes());
+    stream.fill_zero(receives_counted_.get(), receives_counted_.bytes());
+    stream.fill_zero(bordering_.get(), bordering_.bytes());
+    stream.launch(number_by_id_kernel, n,
+                  NumberById{a, boxes(), after(scene), pairs.key, pairs.value, global_id_.get(), role_.get(),
+                             first_send_.get(), first_receive_.get(), sends_counted_.get(), receives_counted_.get(),
+                             send_.get(), receive_.get(), bordering_.get(), border_.get(), damaged_.get()});
+    sort_parts(stream, send_, sends_, n);
+    sort_parts(stream, receive_, receives_, n);
+    stream.wait();
+    check_damage();
+  }
+  void reserve_exchange() {
+    const auto out = static_cast<std::size_t>(sum(sends_)), in = static_cast<std::size_t>(sum(receives_));
+    send_.reserve(out);
+    receive_.reserve(in);
+    for (Buffer<int>& spare : spare_) spare.reserve(std::max(out, in));
+    border_.reserve(static_cast<std::size_t>(borders_));
+    out_.reserve(out);
+    in_.reserve(in);
+    first_send_.upload(starts(sends_));
+    first_receive_.upload(starts(receives_));
   }
   /// That nothing was lost on the way or came twice, and that both sides expect the same.
   void check(int total) const {
-    for (const int damaged : ranks_.all(damaged_.download(1)[0]))
-      if (damaged != 0)
-        throw BackendError("a rank has " + std::to_string(damaged) +
-                           " particles after a migration that came twice or in part");
+    check_damage();
     std::int64_t owned = 0;
     for (const std::int64_t each : ranks_.all(statistics_.owned)) owned += each;
     if (owned != total)
@@ -347,31 +377,22 @@ class Halo {
         throw BackendError("rank " + std::to_string(r) + " sends " + std::to_string(expected[k]) + " ghosts to rank " +
                            std::to_string(ranks_.rank()) + ", which expects " + std::to_string(receives_[k]));
   }
-  void list_exchanged(Stream& stream, const SceneArrays& scene, const int* at, int n) {
-    const auto out = static_cast<std::size_t>(sum(sends_)), in = static_cast<std::size_t>(sum(receives_));
-    send_.reserve(out);
-    receive_.reserve(in);
-    values_.reserve(std::max(out, in));
-    out_.reserve(out);
-    in_.reserve(in);
-    first_send_.upload(starts(sends_));
-    first_receive_.upload(starts(receives_));
-    for (Buffer<int>* each : {&sends_counted_, &receives_counted_}) stream.fill_zero(each->get(), each->bytes());
-    stream.launch(list_exchanged_kernel, n,
-                  ListExchanged{boxes(), after(scene), at, first_send_.get(), first_receive_.get(),
-                                sends_counted_.get(), receives_counted_.get(), send_.get(), receive_.get()});
-    sort_parts(stream, send_, sends_);
-    sort_parts(stream, receive_, receives_);
-    stream.wait();
+  void check_damage() const {
+    for (const int damaged : ranks_.all(damaged_.download(1)[0]))
+      if (damaged != 0)
+        throw BackendError("a rank has " + std::to_string(damaged) +
+                           " particles after a migration that came twice or in part");
   }
-  void sort_parts(Stream& stream, const Buffer<int>& list, const std::vector<int>& parts) const {
+  void sort_parts(Stream& stream, const Buffer<int>& list, const std::vector<int>& parts, int n) {
     int first = 0;
     for (const int part : parts) {
-      if (part > 1) stream.sort_by_key(list.get() + first, values_.get(), part);
+      int* const at = list.get() + first;
+      Pairs pairs{at, spare_[0].get(), spare_[1].get(), spare_[2].get()};
+      if (part > 1) stream.sort_pairs(pairs, part, bits_below(n), sort_);
+      if (pairs.key != at) stream.copy(at, pairs.key, static_cast<std::size_t>(part) * sizeof(int));
       first += part;
     }
   }
-
   /// Bits that numbers below n have.
   static int bits_below(int n) {
     int bits = 1;
@@ -407,17 +428,37 @@ class Halo {
   bool fresh_ = false;              // the ghosts that there are suffice for the state that there is
   Box reach_{};
   double step_ = 0;  // how far the fastest particle moved in the last substep, m
+  double fall_ = 0;  // and by how much farther in each next one if it falls, m
   int most_substeps_ = first_substeps;
   RankStatistics statistics_;
   Buffer<Box> own_boxes_, reach_boxes_;
   Buffer<int> global_id_, index_, farthest_;
-  Buffer<unsigned char> ghost_;
+  Buffer<ParticleRole> role_;
+  Buffer<int> border_;  // own particles that others have copies of
+  int borders_ = 0;     // how many
   Buffer<char> scan_, sort_;
-  Buffer<int> departing_, gone_, first_, sends_counted_, receives_counted_, damaged_, first_send_, first_receive_;
+  Buffer<int> departing_, gone_, first_, sends_counted_, receives_counted_, bordering_, damaged_, first_send_,
+      first_receive_;
   Buffer<Traveller> travellers_out_, travellers_in_;
   std::vector<int> sends_, receives_;  // by rank, particles per substep
-  Buffer<int> send_, receive_, values_;
+  Buffer<int> send_, receive_, spare_[3];
   Buffer<GhostState> out_, in_;
+};
+
+/// For a search's integration (NoExchange).
+struct StateExchange {
+  Halo& halo;
+  Stream& stream;
+  const ParticleArrays& a;
+
+  template <class Integrate>
+  void start(const Integrate& integrate) const {
+    halo.start_states(stream, a, integrate);
+  }
+  template <class After>
+  void finish(const After& after) const {
+    halo.finish_states(stream, a, after);
+  }
 };
 
 }  // namespace

@@ -25,8 +25,8 @@ class SceneArrays {
     if (!problem.rank_boxes.empty()) {
       total_ = problem.particles;
       // Ghosts are to come: some layers around what is about a cube.
-      const double layers = 10 * std::cbrt(static_cast<double>(n_) * n_);
-      room_ = std::min(total_, n_ + static_cast<int>(layers) + n_ / 20) + tile_size;
+      const double layers = 8 * std::cbrt(static_cast<double>(n_) * n_);
+      room_ = std::min(total_, n_ + static_cast<int>(layers) + n_ / 50) + tile_size;
     }
     load_geometry(problem.geometry);
     load_walls(problem.walls);

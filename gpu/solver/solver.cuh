@@ -252,9 +252,8 @@ class Solver : public DeviceSolver {
     const NamedRange range("integrate");
     if constexpr (RankSearch<Search>)
       if (halo_)
-        return search_.template integrate<periodic>(
-            stream_, a, scene_.geometry(), next_rebuild,
-            [&](const auto& after) { halo_->exchange_states(stream_, a, after); });
+        return search_.template integrate<periodic>(stream_, a, scene_.geometry(), next_rebuild,
+                                                    StateExchange{*halo_, stream_, a});
     search_.template integrate<periodic>(stream_, a, scene_.geometry(), next_rebuild);
   }
   template <bool periodic>
