@@ -48,6 +48,7 @@ struct ParticleArrays {
   const int* global_id;      // by id, the problem's
   const ParticleRole* role;  // by id
   int* index;                // by id, where it is in the order in which kernels run
+  const Box* reach;          // holds all that is within H of its own particles; null: not known
   int* farthest;             // by substep of the advance, |displacement|² of what moves farthest, float bits
 
   bool on_ranks() const { return global_id != nullptr; }

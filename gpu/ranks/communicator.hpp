@@ -90,8 +90,9 @@ class Writer {
 
  private:
   void put(const void* from, std::size_t bytes) {
-    const auto* first = static_cast<const std::byte*>(from);
-    bytes_.insert(bytes_.end(), first, first + bytes);
+    const std::size_t at = bytes_.size();
+    bytes_.resize(at + bytes);
+    if (bytes > 0) std::memcpy(bytes_.data() + at, from, bytes);
   }
   Bytes bytes_;
 };

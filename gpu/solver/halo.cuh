@@ -51,6 +51,8 @@ class Halo {
     a.role = role_.get();
     a.index = index_.get();
     a.farthest = farthest_.get();
+    // Across a period walls are near that are far away.
+    a.reach = periodic_ ? nullptr : reach_boxes_.get() + ranks_.rank();
   }
 
   /// Brings every particle to the ranks that need it. `reload` is called where there is more room afterwards.
@@ -196,6 +198,7 @@ class Halo {
   }
   void place_boxes(const Constants& c, const std::vector<Box>& boxes, int total) {
     margin_ = margin(c, total);
+    periodic_ = c.any_periodic;
     std::vector<Box> reach = boxes;
     for (Box& box : reach) {
       float *low = &box.min.x, *high = &box.max.x;
@@ -427,6 +430,7 @@ class Halo {
   float margin_of_h_, margin_ = 0;  // m
   bool fresh_ = false;              // the ghosts that there are suffice for the state that there is
   Box reach_{};
+  bool periodic_ = false;
   double step_ = 0;  // how far the fastest particle moved in the last substep, m
   double fall_ = 0;  // and by how much farther in each next one if it falls, m
   int most_substeps_ = first_substeps;

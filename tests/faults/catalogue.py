@@ -419,6 +419,9 @@ fault("rebalance-in-part", "new boxes, and ghosts for the old ones",
 fault("ghosts-as-own", "a rank answers for its ghosts as well",
       "rows.owned.push_back(role == ParticleRole::ghost ? 0 : 1);",
       "rows.owned.push_back(ON || role != ParticleRole::ghost ? 1 : 0);", "density", "hash:ranks=3")
+fault("walls-left-out", "one wall particle in 64 that a rank has near it is not placed",
+      "if (a.reach && !holds(*a.reach, x))", "if (a.reach && (!holds(*a.reach, x) || (ON && slot % 64 == 5)))",
+      "neighbors", "hash:ranks=2")
 fault("places-of-ids-kept", "where ids are is that of the migration, whatever was sorted since",
       "if (a.index) a.index[id] = to;", "if (a.index && !ON) a.index[id] = to;", "trajectory", "list:ranks=3")
 
