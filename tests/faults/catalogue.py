@@ -371,7 +371,7 @@ fault("stale-ghosts", "ghosts are sent as they were before the substep",
       "hash:ranks=3")
 fault("border-moves-twice", "what others have copies of moves with the other particles once more",
       "if (!a.moves_apart(i)) integrate_stored", "if (!a.moves_apart(i) || (ON && !a.is_ghost(i))) integrate_stored",
-      "substep", "list:ranks=3")
+      "trajectory", "list:ranks=3")
 fault("stale-ghost-densities", "densities of ghosts are not sent",
       "exchange(stream, out, in);", "if (!ON) exchange(stream, out, in);", "evaluation", "hash:ranks=3")
 fault("lost-in-migration", "every 50th particle that leaves does not arrive",
@@ -428,7 +428,7 @@ fault("places-of-ids-kept", "where ids are is that of the migration, whatever wa
 # What only a GPU can do wrong.
 fault("exchange-before-it-is-there", "what is sent is read before the stream has written it",
       "stream.wait();\n    ranks_.exchange(from, to);", "if (!ON) stream.wait();\n    ranks_.exchange(from, to);",
-      "acceleration", "hash:ranks=3", on="cuda")
+      "evaluation", "hash:ranks=3", on="cuda")
 fault("missing-sync", "nobody waits until a tile has been read",
       "    }\n    __syncthreads();\n    return tile_;", "    }\n    if (!ON) __syncthreads();\n    return tile_;",
       "density", "brute", on="cuda",

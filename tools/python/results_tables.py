@@ -330,7 +330,27 @@ def live():
     return table(heads, shown) + source(path, device_of(told["rows"][0]["device"]), told["provenance"]["git_revision"])
 
 
+def ranks():
+    shown, where = [], ""
+    for name in ("ranks-3M", "ranks-16M"):
+        path = RESULTS / "h200-x2" / f"{name}.json"
+        told = json.loads(path.read_text(encoding="utf-8"))
+        rows = {(row["backend"], row["options"]): row for row in told["rows"]}
+        for backend in ("hash", "list"):
+            one, two = rows[backend, ""], rows[backend, "ranks=2"]
+            speedup = one["substep_us"] / two["substep_us"]
+            memory = two["device_bytes_per_particle"] / one["device_bytes_per_particle"]
+            shown.append([f"{one['particles']:,}", f"`{backend}`", significant(one["substep_us"], 4),
+                          significant(two["substep_us"], 4), f"{speedup:.2f}", f"{100 * speedup / 2:.0f} %",
+                          f"{memory:.2f}"])
+        where += source(path, "2 × " + device_of(one["device"]), told["provenance"]["git_revision"])
+    heads = ["particles", "backend", "one GPU, µs per substep", "two", "speedup", "efficiency",
+             "memory per particle, ratio"]
+    return table(heads, shown) + where
+
+
 TABLES = {
+    "ranks": ranks,
     "live": live,
     "study-size": study_size,
     "study-error": study_error,
