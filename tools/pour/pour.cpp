@@ -130,7 +130,9 @@ Result Pour::run() {
   progress_->pause();
   if (frame_ == scene_.schedule.frames) finish();
   else checkpoint();
-  return result();
+  Result r = result();
+  r.ranks = backend_.neighbor_stats().ranks;
+  return r;
 }
 
 Result Pour::result() {

@@ -46,6 +46,7 @@ struct Result {
   std::vector<LimitExceeded> limits_exceeded;
   Timeline timeline;
   Summary summary;
+  RankStats ranks;  // of this session
 };
 
 /// Pours. Throws InputError where the folder holds another pour or the disk has no room;

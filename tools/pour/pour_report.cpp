@@ -30,6 +30,12 @@ std::string result_json(const Result& result, const BackendInfo& info, const std
                         {"value", e.value},
                         {"largest", e.largest},
                         {"frames", e.frames}});
+  nlohmann::ordered_json ranks;
+  if (result.ranks.migrations > 0)
+    ranks = {{"ghosts", result.ranks.ghosts},
+             {"migrations", result.ranks.migrations},
+             {"rebalances", result.ranks.rebalances},
+             {"largest_imbalance", result.ranks.largest_imbalance}};
   const nlohmann::ordered_json all = {
       {"out", out},
       {"finished", result.finished},
@@ -64,6 +70,7 @@ std::string result_json(const Result& result, const BackendInfo& info, const std
       {"wall_seconds", s.wall_seconds},
       {"substep_us", 1e6 * s.seconds_per_substep},
       {"stages", stages},
+      {"ranks", ranks},
       {"provenance", build_provenance()},
   };
   return all.dump(2);
@@ -95,6 +102,9 @@ void print_result(const Result& result, const BackendInfo& info, const Scene& sc
     if (const StageTimes::Stage& time = result.timeline.stages.*stage.stage; time.calls > 0)
       fmt::print(", {} {:.4g}", stage.name, 1e6 * time.seconds / static_cast<double>(time.calls));
   fmt::print("\n");
+  if (result.ranks.migrations > 0)
+    fmt::print("  ranks      {} migrations, largest imbalance {:.1f} %, {} ghosts at the end\n",
+               result.ranks.migrations, 100 * (result.ranks.largest_imbalance - 1), result.ranks.ghosts);
   fmt::print("  beside it  fields of frames {:.3g} s, waiting for audit and disk {:.3g} s\n", result.fields_seconds,
              result.wait_seconds);
 }
