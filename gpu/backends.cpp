@@ -11,6 +11,7 @@
 
 #include <tbb/parallel_invoke.h>
 
+#include <csignal>
 #include <functional>
 #include <optional>
 #include <span>
@@ -193,6 +194,8 @@ ProcessRanks::~ProcessRanks() = default;
 
 bool ProcessRanks::serve() {
   if (!others_) return false;
+  // Rank 0 decides what becomes of a stop; mpirun sends it to all.
+  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_IGN);
   gpu::RankSide(*others_, make_solver).serve();
   return true;
 }

@@ -3,6 +3,8 @@
 import os
 import random
 import signal
+import subprocess
+import sys
 import time
 
 import pytest
@@ -70,6 +72,27 @@ def test_killed_scheduler_is_waited_for(tmp_path, sequential):
     assert status == 0 and "the scheduler was lost" in err, err
     assert before.items() <= blocks(tmp_path / "c").items()
     assert everything(tmp_path / "c" / "report.h5") == expected
+
+
+def test_interruption_within_a_destructor_is_not_lost():
+    program = """
+import os, signal, sys, time
+from decant.campaign import command
+
+class Dying:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(0.1)
+
+def run(_):
+    Dying()
+    time.sleep(30)
+
+command.run = run
+sys.exit(command.main(["fuzz", "--backend", "hash", "--cases", "1", "--folder", "nowhere"]))
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=25)
+    assert done.returncode == 128 + signal.SIGTERM and "interrupted" in done.stderr, done.stderr
 
 
 def test_interrupted_client_keeps_what_it_has(tmp_path, sequential):

@@ -115,11 +115,17 @@ def main(words: list[str] | None = None, prog: str = "decant campaign") -> int:
     arguments = parser.parse_args(words)
     caught = []
 
-    def stop(number, _):
-        caught.append(number)
+    def stop(number, frame):
+        if number != signal.SIGALRM:
+            caught.append(number)
+        while frame is not None:
+            if frame.f_code.co_name == "__del__":  # what is raised there is ignored
+                signal.setitimer(signal.ITIMER_REAL, 0.05)
+                return
+            frame = frame.f_back
         raise KeyboardInterrupt
 
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM):
         signal.signal(number, stop)
     try:
         result = run(arguments)
