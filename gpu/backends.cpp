@@ -74,8 +74,6 @@ std::weak_ptr<gpu::RankTeam>& process_team() {
   return team;
 }
 
-bool runs_on_ranks(std::string_view backend) { return backend == "hash" || backend == "list"; }
-
 class DeviceBackend : public Backend {
  public:
   DeviceBackend(std::string name, Executor executor, std::string options, std::unique_ptr<DeviceSolver> solver)
@@ -88,15 +86,8 @@ class DeviceBackend : public Backend {
   void load(const Scene& scene, const Walls& walls, const ParticleState& state) override {
     scene_ = scene;
     substep_ = state.substep;
-    gpu::Problem problem{gpu::make_constants(scene),
-                         gpu::make_geometry(scene),
-                         gpu::make_region(scene),
-                         gpu::make_wall_samples(scene, walls),
-                         rows_of(state.position),
-                         rows_of(state.velocity),
-                         0,
-                         {},
-                         {}};
+    gpu::Problem problem{gpu::make_constants(scene),           gpu::make_geometry(scene), gpu::make_region(scene),
+                         gpu::make_wall_samples(scene, walls), rows_of(state.position),   rows_of(state.velocity)};
     solver_->load(problem);
   }
 
@@ -123,8 +114,8 @@ class DeviceBackend : public Backend {
                            out.wall_neighbor_id_sum = ids_of(fields.wall_id_sum);
                          });
     if (out.fluid_neighbor_count.size() > 0) {
-      stats_.mean_fluid = out.fluid_neighbor_count.cast<double>().mean();
-      stats_.mean_wall = out.wall_neighbor_count.cast<double>().mean();
+      mean_fluid_ = out.fluid_neighbor_count.cast<double>().mean();
+      mean_wall_ = out.wall_neighbor_count.cast<double>().mean();
     }
     if (!status.ok()) status.substep += substep_;
     return status;
@@ -155,12 +146,9 @@ class DeviceBackend : public Backend {
 
   StageTimes stage_times() const override { return solver_->stage_times(); }
   NeighborStats neighbor_stats() const override {
-    NeighborStats stats = stats_;
-    stats.rebuilds = solver_->rebuilds();
-    stats.verified = solver_->pair_totals();
-    stats.device_bytes = static_cast<std::int64_t>(solver_->device_bytes());
-    const gpu::RankStatistics ranks = solver_->rank_statistics();
-    stats.ranks = {ranks.ghosts, ranks.refreshes, ranks.rebalances, ranks.largest_imbalance};
+    NeighborStats stats = solver_->neighbor_stats();
+    stats.mean_fluid = mean_fluid_;
+    stats.mean_wall = mean_wall_;
     return stats;
   }
 
@@ -176,7 +164,7 @@ class DeviceBackend : public Backend {
   std::unique_ptr<DeviceSolver> solver_;
   std::optional<Scene> scene_;
   std::int64_t substep_ = 0;
-  NeighborStats stats_;
+  double mean_fluid_ = 0, mean_wall_ = 0;  // neighbors a particle at the last evaluation
 };
 
 }  // namespace
@@ -187,7 +175,7 @@ ProcessRanks::ProcessRanks() : others_(gpu::mpi_communicator()) {
   gpu::cuda::use_device(gpu::rank_on_this_machine(*others_));
 #endif
   if (others_->rank() != 0) return;
-  team_ = gpu::make_process_team(std::move(others_), make_solver);
+  team_ = std::make_shared<gpu::RankTeam>(std::move(others_), make_solver);
   process_team() = team_;
 }
 ProcessRanks::~ProcessRanks() = default;
@@ -200,10 +188,6 @@ bool ProcessRanks::serve() {
   return true;
 }
 
-int process_ranks() {
-  const auto team = process_team().lock();
-  return team ? team->size() : 1;
-}
 std::string mpi_version() { return gpu::mpi_version(); }
 std::string nccl_version() {
 #if DECANT_HAS_CUDA
@@ -257,7 +241,7 @@ std::unique_ptr<Backend> make_backend(std::string_view name, Executor executor, 
     if (!executor_available(executor, &why_not)) throw BackendError("executor cuda: " + why_not);
     gpu::SolverChoice choice{{}, executor == Executor::cuda, parsed};
     name.copy(choice.backend, sizeof choice.backend - 1);
-    auto team = runs_on_ranks(name) ? process_team().lock() : nullptr;
+    auto team = gpu::takes_option(entry.name, "ranks") ? process_team().lock() : nullptr;
     if (team && parsed.ranks != 1)
       throw InputError("command line", "--backend", std::string(name) + ":" + options,
                        "without ranks under mpirun, whose processes are the ranks");

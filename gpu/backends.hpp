@@ -19,7 +19,8 @@ class RankTeam;
 
 enum class Executor { host, cuda };
 
-/// The processes that mpirun started with this one. While rank 0's lives, `hash` and `list` run on all of them.
+/// The processes that mpirun started with this one. While rank 0's lives, backends that have the option `ranks` run
+/// on all of them.
 /// Where there is one process nothing changes.
 class ProcessRanks {
  public:
@@ -38,8 +39,6 @@ class ProcessRanks {
   std::shared_ptr<gpu::RankTeam> team_;
 };
 
-/// How many processes run `hash` and `list`; 1 without mpirun.
-int process_ranks();
 /// "Open MPI 4.1.4" and "2.28.3", or "none".
 std::string mpi_version();
 std::string nccl_version();

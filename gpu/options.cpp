@@ -156,6 +156,11 @@ const std::vector<OptionDescription>& option_descriptions() {
   return all;
 }
 
+bool takes_option(const std::string& backend, const std::string& key) {
+  return std::any_of(entries().begin(), entries().end(),
+                     [&](const Entry& e) { return belongs_to(e, backend) && key == e.description.key; });
+}
+
 SolverOptions parse_options(const std::string& backend, const std::string& text) {
   SolverOptions options;
   std::set<std::string> seen;

@@ -44,6 +44,9 @@ struct OptionDescription {
 
 const std::vector<OptionDescription>& option_descriptions();
 
+/// Whether a backend has an option, by its key.
+bool takes_option(const std::string& backend, const std::string& key);
+
 /// Options as the command line gives them, "key=value:key=value", for a backend that knows `keys`.
 /// Throws InputError for an unknown key or a value out of range.
 SolverOptions parse_options(const std::string& backend, const std::string& text);

@@ -49,6 +49,11 @@ struct alignas(16) Edge {
 
 struct Box {
   Float3 min, max;
+
+  /// With its lower faces and without its upper ones, so that boxes side by side share nothing.
+  constexpr bool holds(const Float3& x) const {
+    return x.x >= min.x && x.x < max.x && x.y >= min.y && x.y < max.y && x.z >= min.z && x.z < max.z;
+  }
 };
 
 /// Exposed rectangle of a box union; its outward normal is `side` along `axis`.

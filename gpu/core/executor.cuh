@@ -121,5 +121,23 @@ inline int atomic_load(const int* from) {
 
 #endif
 
+/// Floats as integers in the same order, for atomics.
+DECANT_BOTH int ordered(float f) {
+  int bits;
+  memcpy(&bits, &f, sizeof bits);
+  return bits >= 0 ? bits : bits ^ 0x7FFFFFFF;
+}
+DECANT_BOTH float unordered(int i) {
+  const int bits = i >= 0 ? i : i ^ 0x7FFFFFFF;
+  float f;
+  memcpy(&f, &bits, sizeof f);
+  return f;
+}
+/// The larger of a value and what is there, as ordered() has it; looking first saves most atomics.
+DECANT_DEVICE void raise_to(int* largest, float value) {
+  const int bits = ordered(value);
+  if (bits > atomic_load(largest)) atomic_maximum(largest, bits);
+}
+
 }  // namespace
 }  // namespace decant::gpu

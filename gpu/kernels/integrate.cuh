@@ -54,11 +54,8 @@ struct Integrate {
 
  private:
   DECANT_DEVICE void note_displacement(Float3 d) const {
-    const float square = dot(d, d), bounded = square <= 3.0e38f ? square : 3.4e38f;  // NaN is far
-    int bits;
-    memcpy(&bits, &bounded, sizeof bits);
-    int* farthest = a.farthest + a.status->substeps_begun - 1;
-    if (bits > atomic_load(farthest)) atomic_maximum(farthest, bits);
+    const float square = dot(d, d);
+    raise_to(a.farthest + a.status->substeps_begun - 1, square <= 3.0e38f ? square : 3.4e38f);  // NaN is far
   }
   DECANT_DEVICE float wrap(int axis, float x) const {
     if (!c.periodic[axis]) return x;

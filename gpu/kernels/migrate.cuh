@@ -60,12 +60,8 @@ struct AssignRanks {
     to.owner = 0;  // of what is nowhere
     if (!is_finite(x)) return;
     x = {into_domain(0, x.x), into_domain(1, x.y), into_domain(2, x.z)};
-    for (int r = 0; r < boxes.ranks; ++r) {
-      const Box& own = boxes.own[r];
-      if (x.x >= own.min.x && x.x < own.max.x && x.y >= own.min.y && x.y < own.max.y && x.z >= own.min.z &&
-          x.z < own.max.z)
-        to.owner = r;
-    }
+    for (int r = 0; r < boxes.ranks; ++r)
+      if (boxes.own[r].holds(x)) to.owner = r;
     for (int r = 0; r < boxes.ranks; ++r) {
       const Box& reach = boxes.reach[r];
       if (r != to.owner && within(0, reach.min.x, reach.max.x, x.x) && within(1, reach.min.y, reach.max.y, x.y) &&
@@ -126,28 +122,20 @@ struct Arrive {
 };
 DECANT_KERNEL(256) arrive_kernel(int n, Arrive arrive) { for_each_thread(n, arrive); }
 
-/// Keys for the sort by the problem's ids, and what they belong to.
-struct KeyById {
-  const Registration* registrations;
-  int *key, *index;
-
-  DECANT_DEVICE void operator()(int i) const {
-    key[i] = registrations[i].id;
-    index[i] = i;
-  }
-};
-DECANT_KERNEL(256) key_by_id_kernel(int n, KeyById make) { for_each_thread(n, make); }
-
-/// How many particles a rank exchanges with each other one in a substep, and how many have copies anywhere.
+/// How many particles a rank exchanges with each other one in a substep, and how many have copies anywhere; and
+/// keys for the sort by the problem's ids, with what they belong to.
 struct CountExchanged {
   RankBoxes boxes;
   const Registration* registrations;
   int *sends, *receives;  // by rank
   int* border;
   int* damaged;  // particles with what nobody wrote
+  int *key, *index;
 
   DECANT_DEVICE void operator()(int i) const {
     const Registration r = registrations[i];
+    key[i] = r.id;
+    index[i] = i;
     if (!boxes.are_of(r.owner)) atomic_increment(damaged);
     else if (r.owner != boxes.rank) atomic_increment(receives + r.owner);
     else if (r.ghost_on != 0) {
@@ -209,9 +197,7 @@ struct Survey {
     if (a.is_ghost(i)) return;
     const Float3 v = xyz(a.state.velocity[i]);
     const float square = dot(v, v), bounded = square <= 3.0e38f ? square : 0.0f;  // what is nowhere ends the run
-    int bits;
-    memcpy(&bits, &bounded, sizeof bits);
-    if (bits > atomic_load(fastest)) atomic_maximum(fastest, bits);
+    raise_to(fastest, bounded);
     const int own = a.problem_id(a.id[i]);
     if (own % every != 0) return;
     const int k = atomic_increment(samples);

@@ -69,16 +69,12 @@ struct PlaceWalls {
     const DevicePose* poses = what == WallsFor::force ? a.poses_before() : a.poses_after();
     const DevicePose& pose = poses[walls.container[slot]];
     const Float3 x = rotate(pose, xyz(walls.local[slot])) + pose.translation;
-    if (a.reach && !holds(*a.reach, x)) return leave_out(slot);
+    if (a.reach && !a.reach->holds(x)) return leave_out(slot);
     if constexpr (what != WallsFor::force) place_wall_for_density(a, walls, slot, x, id);
     if constexpr (what != WallsFor::density) place_wall_for_force(a, walls, slot, x, id, pose);
   }
 
  private:
-  DECANT_DEVICE static bool holds(const Box& box, Float3 x) {
-    return x.x >= box.min.x && x.x <= box.max.x && x.y >= box.min.y && x.y <= box.max.y && x.z >= box.min.z &&
-           x.z <= box.max.z;
-  }
   /// Of a rank that has nothing near it: far from everything, which most are already and nobody writes twice.
   DECANT_DEVICE void leave_out(int slot) const {
     constexpr float far = 1e12f;

@@ -37,18 +37,6 @@ struct DisplacementBox {
   int low[3], high[3];
 };
 
-DECANT_DEVICE int ordered(float f) {
-  int bits;
-  memcpy(&bits, &f, sizeof bits);
-  return bits >= 0 ? bits : bits ^ 0x7FFFFFFF;
-}
-DECANT_DEVICE float unordered(int i) {
-  const int bits = i >= 0 ? i : i ^ 0x7FFFFFFF;
-  float f;
-  memcpy(&f, &bits, sizeof f);
-  return f;
-}
-
 DECANT_DEVICE float sound_skin(float skin) { return skin * (1.0f - 0x1p-10f); }
 
 /// The fastest particle's speed, for ChooseSkin.
@@ -58,8 +46,7 @@ struct FindFastest {
 
   DECANT_DEVICE void operator()(int i) const {
     const Float3 v = xyz(velocity[i]);
-    const int bits = ordered(dot(v, v));  // not negative; NaN is the largest
-    if (bits > atomic_load(&a.status->fastest)) atomic_maximum(&a.status->fastest, bits);
+    raise_to(&a.status->fastest, dot(v, v));  // not negative; NaN is the largest
   }
 };
 DECANT_KERNEL(256) find_fastest_kernel(int n, FindFastest find) { for_each_thread(n, find); }

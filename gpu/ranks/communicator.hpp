@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -47,9 +48,8 @@ class Communicator {
   /// Ends what the others wait for: their operations throw, or their processes end, with this reason.
   virtual void fail(const std::string& why) noexcept = 0;
 
-  /// Of the same ranks' devices, once somebody has made it; one serves all solvers.
-  std::unique_ptr<DeviceExchange> between_devices;
-  bool asked_for_devices = false;
+  /// Of the same ranks' devices, once somebody has asked for it, null where there is none; one serves all solvers.
+  std::optional<std::unique_ptr<DeviceExchange>> between_devices;
 
   /// What each rank has, by rank.
   template <class T>

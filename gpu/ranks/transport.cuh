@@ -17,8 +17,8 @@ class Transport {
   /// All ranks make theirs together.
   explicit Transport(Communicator& ranks) : ranks_(ranks) {
 #ifdef __CUDACC__
-    if (!ranks.asked_for_devices) ranks.between_devices = cuda::make_nccl_exchange(ranks);
-    ranks.asked_for_devices = true;
+    if (!ranks.between_devices) ranks.between_devices = cuda::make_nccl_exchange(ranks);
+    between_devices_ = ranks.between_devices->get();
     int least = 0, most = 0;
     CUDA_CHECK(cudaDeviceGetStreamPriorityRange(&least, &most));
     CUDA_CHECK(cudaStreamCreateWithPriority(&beside_, cudaStreamNonBlocking, most));
@@ -40,7 +40,7 @@ class Transport {
   /// next.
   void exchange([[maybe_unused]] Stream& stream, std::span<const Segment> send, std::span<const Segment> receive) {
 #ifdef __CUDACC__
-    if (ranks_.between_devices) return ranks_.between_devices->exchange(send, receive, stream.handle());
+    if (between_devices_) return between_devices_->exchange(send, receive, stream.handle());
     std::vector<Segment> from = staged(send, out_), to = staged(receive, in_);
     for (std::size_t k = 0; k < send.size(); ++k)
       if (send[k].bytes > 0)
@@ -59,10 +59,10 @@ class Transport {
   /// The same beside what the stream does until `finish`, where that is between devices.
   void start([[maybe_unused]] Stream& stream, std::vector<Segment> send, std::vector<Segment> receive) {
 #ifdef __CUDACC__
-    if (ranks_.between_devices) {
+    if (between_devices_) {
       CUDA_CHECK(cudaEventRecord(packed_, stream.handle()));
       CUDA_CHECK(cudaStreamWaitEvent(beside_, packed_));
-      ranks_.between_devices->exchange(send, receive, beside_);
+      between_devices_->exchange(send, receive, beside_);
       CUDA_CHECK(cudaEventRecord(received_, beside_));
       return;
     }
@@ -72,7 +72,7 @@ class Transport {
   }
   void finish(Stream& stream) {
 #ifdef __CUDACC__
-    if (ranks_.between_devices) {
+    if (between_devices_) {
       CUDA_CHECK(cudaStreamWaitEvent(stream.handle(), received_));
       return;
     }
@@ -93,6 +93,7 @@ class Transport {
     }
     return out;
   }
+  DeviceExchange* between_devices_ = nullptr;
   PinnedBuffer out_, in_;
   cudaStream_t beside_ = nullptr;
   cudaEvent_t packed_ = nullptr, received_ = nullptr;

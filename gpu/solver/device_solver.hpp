@@ -25,22 +25,14 @@ struct Problem {
   std::vector<float> position, velocity;  // [N,3] row-major, m, m/s
   // Of one rank of several: how many particles there are, the ids of its rows, ascending, and the ranks' boxes.
   int particles = 0;
-  std::vector<int> id;
-  std::vector<Box> rank_boxes;
+  std::vector<int> id{};
+  std::vector<Box> rank_boxes{};
 };
 
 /// Rows of a rank's fields and states: which particle each is of, and whether it is this rank's own (1) or a ghost.
 struct RankRows {
   std::vector<int> id;
   std::vector<unsigned char> owned;
-};
-
-/// How several ranks share the particles.
-struct RankStatistics {
-  std::int64_t owned = 0, ghosts = 0;  // here, now
-  std::int64_t refreshes = 0;          // how often ghosts were chosen anew, since `load`
-  std::int64_t rebalances = 0;         // and the boxes
-  double largest_imbalance = 1;        // most particles of a rank by their mean, at the refreshes since the first
 };
 
 /// Fields in id order, as state.hpp names them; vectors are [N,3] row-major.
@@ -74,19 +66,14 @@ class DeviceSolver {
   /// State in id order, there until the next call.
   virtual StateRows read() = 0;
   virtual StageTimes stage_times() const = 0;
-  /// How often neighbors were looked for anew, since `load`.
-  virtual std::int64_t rebuilds() const = 0;
-  /// What lists that verify themselves counted, since `load`.
-  virtual PairTotals pair_totals() const = 0;
-  /// Device memory held.
-  virtual std::size_t device_bytes() const = 0;
+  /// Without the mean numbers of neighbors, which an evaluation tells.
+  virtual NeighborStats neighbor_stats() const = 0;
 
   /// Makes it one of several ranks that share a problem; before `load`. From then on load, evaluate,
   /// evaluate_density and advance are called by all ranks together, a status is that of all of them, and fields and
   /// states are of the rank's own rows. Throws BackendError where a backend cannot.
   virtual void join(Communicator& ranks);
   virtual RankRows rank_rows() const { return {}; }
-  virtual RankStatistics rank_statistics() const { return {}; }
 };
 
 /// The names of the backends under test. A new one is a line here and a file in backends/ with its factory, for

@@ -11,13 +11,14 @@
 #include "gpu/kernels/exchange.cuh"
 #include "gpu/kernels/integrate.cuh"
 #include "gpu/kernels/migrate.cuh"
-#include "gpu/ranks/partition.hpp"
 #include "gpu/ranks/transport.cuh"
+#include "gpu/solver/decomposition.cuh"
 #include "gpu/solver/scene_arrays.cuh"
 #include "reference/error.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <numeric>
 
 namespace decant::gpu {
@@ -27,13 +28,13 @@ class Halo {
  public:
   /// \param margin  of H; negative: by the speed of the fastest particle
   Halo(Communicator& ranks, double margin)
-      : ranks_(ranks), transport_(ranks), margin_of_h_(static_cast<float>(margin)) {}
+      : ranks_(ranks), transport_(ranks), decomposition_(ranks, static_cast<float>(margin)) {}
 
   Communicator& ranks() const { return ranks_; }
   bool fresh() const { return fresh_; }
   /// Where a rank's own particles and ghosts are.
-  const Box& reach() const { return reach_; }
-  const RankStatistics& statistics() const { return statistics_; }
+  const Box& reach() const { return decomposition_.reach(); }
+  const RankStats& statistics() const { return statistics_; }
 
   void load(const Problem& problem, const SceneArrays& scene) {
     fresh_ = false;
@@ -41,9 +42,7 @@ class Halo {
     reserve(scene.room());
     global_id_.upload(problem.id);
     role_.upload(std::vector<ParticleRole>(problem.id.size(), ParticleRole::interior));
-    step_ = 0;
-    place_boxes(problem.constants, problem.rank_boxes, problem.particles);
-    statistics_.owned = static_cast<std::int64_t>(problem.id.size());
+    decomposition_.load(problem);
   }
 
   void attach(ParticleArrays& a) const {
@@ -51,15 +50,14 @@ class Halo {
     a.role = role_.get();
     a.index = index_.get();
     a.farthest = farthest_.get();
-    // Across a period walls are near that are far away.
-    a.reach = periodic_ ? nullptr : reach_boxes_.get() + ranks_.rank();
+    a.reach = decomposition_.walls_within();
   }
 
   /// Brings every particle to the ranks that need it. `reload` is called where there is more room afterwards.
   template <class Reload>
   void refresh(Stream& stream, SceneArrays& scene, Reload reload) {
-    if (statistics_.refreshes > 0) {
-      const double now = present_imbalance();
+    if (statistics_.migrations > 0) {
+      const double now = imbalance({owned_.begin(), owned_.end()});
       statistics_.largest_imbalance = std::max(statistics_.largest_imbalance, now);
       if (now > most_imbalance) survey(stream, scene);
     }
@@ -78,7 +76,7 @@ class Halo {
     migrate(stream, scene, departing, arriving, kept);
     number(stream, scene, kept + arrivals);
     fresh_ = true;
-    ++statistics_.refreshes;
+    ++statistics_.migrations;
   }
 
   /// Before an advance: boxes, and how far particles will move, are those of the state and of nothing before, so that
@@ -90,8 +88,7 @@ class Halo {
 
   /// How many substeps may be tried, of so many that are wanted.
   int substeps_to_try(Stream& stream, int wanted) {
-    // Whatever else happens, everything may fall freely: k step + ½ k² fall is half the margin.
-    const double b = 1.1 * step_, fit = std::floor(margin_ / (b + std::sqrt(b * b + fall_ * margin_) + 1e-30)) + 1;
+    const double fit = decomposition_.substeps_that_fit();
     const int count = static_cast<int>(std::clamp<double>(fit, 1, std::min(wanted, most_substeps_)));
     farthest_.reserve(static_cast<std::size_t>(count));
     stream.fill_zero(farthest_.get(), static_cast<std::size_t>(count) * sizeof(int));
@@ -102,19 +99,18 @@ class Halo {
     const auto n = static_cast<std::size_t>(count);
     std::vector<int> own = farthest_.download(n), all(n * static_cast<std::size_t>(ranks_.size()));
     ranks_.all_gather(own.data(), n * sizeof(int), all.data());
-    double way = 0;
+    double way = 0, step = 0;
     int hold = 1;
     for (std::size_t s = 0; s < n; ++s) {
       int bits = 0;
       for (std::size_t r = 0; r < static_cast<std::size_t>(ranks_.size()); ++r) bits = std::max(bits, all[r * n + s]);
-      float square = 0;
-      std::memcpy(&square, &bits, sizeof square);
-      step_ = std::sqrt(square);
-      way += step_;
-      fresh_ = way <= 0.5 * margin_;
+      step = std::sqrt(unordered(bits));
+      way += step;
+      fresh_ = way <= 0.5 * decomposition_.margin();
       if (!fresh_ || s + 1 == n) break;
       hold = static_cast<int>(s) + 2;
     }
+    decomposition_.note_step(step);
     most_substeps_ = std::clamp(2 * hold, first_substeps, most_tried);
     return hold;
   }
@@ -162,7 +158,6 @@ class Halo {
  private:
   static constexpr int first_substeps = 64, most_tried = 256;
   static constexpr double most_imbalance = 1.08;
-  static constexpr int samples = 4096;  // per rank
 
   int count() const { return ranks_.size(); }
   static int sum(const std::vector<int>& values) { return std::accumulate(values.begin(), values.end(), 0); }
@@ -188,94 +183,16 @@ class Halo {
     return to_here;
   }
 
-  /// What ghosts cost grows with the margin m, their layers beside n particles; what migrations cost falls with it,
-  /// one in m H / (2 step) substeps. The sum is least at m² = (step/H) n^⅓ (dx/H) (cost of a migration by that of a
-  /// substep) / (cost of a ghost by that of a particle), the latter two about 1 and 1 as measured.
-  float margin(const Constants& c, int total) const {
-    if (margin_of_h_ >= 0) return margin_of_h_ * c.H;
-    const double dx = std::cbrt(c.mass * c.inverse_rest_density), n = static_cast<double>(total) / count();
-    return static_cast<float>(std::clamp(std::sqrt(step_ / c.H * std::cbrt(n) * dx / c.H), 0.1, 3.0)) * c.H;
-  }
-  void place_boxes(const Constants& c, const std::vector<Box>& boxes, int total) {
-    margin_ = margin(c, total);
-    periodic_ = c.any_periodic;
-    std::vector<Box> reach = boxes;
-    for (Box& box : reach) {
-      float *low = &box.min.x, *high = &box.max.x;
-      for (int a = 0; a < 3; ++a) {
-        // A periodic axis has no outside, and an image of everything would lie in an infinite box.
-        if (c.periodic[a]) {
-          low[a] = std::max(low[a], c.domain_min[a]);
-          high[a] = std::min(high[a], c.domain_min[a] + c.period[a]);
-        }
-        const float width = 1.001f * (c.H + margin_) + 0x1p-19f * (c.period[a] + extent(low[a]) + extent(high[a]));
-        low[a] -= width;
-        high[a] += width;
-      }
-    }
-    own_boxes_.upload(boxes);
-    reach_boxes_.upload(reach);
-    reach_ = reach[static_cast<std::size_t>(ranks_.rank())];
-  }
-  static float extent(float x) { return std::isfinite(x) ? std::fabs(x) : 0.0f; }
-  RankBoxes boxes() const { return {ranks_.rank(), count(), own_boxes_.get(), reach_boxes_.get()}; }
-
-  double present_imbalance() const {
-    std::vector<double> work;
-    for (const std::int64_t owned : ranks_.all(statistics_.owned)) work.push_back(static_cast<double>(owned));
-    return imbalance(work);
-  }
-
-  struct Sample {
-    int id;
-    WorkSample work;
-  };
-  /// New boxes, and the speed of the fastest particle.
-  void survey(Stream& stream, SceneArrays& scene) {
-    const Constants& c = scene.constants();
+  ParticleArrays arrays(SceneArrays& scene) const {
     ParticleArrays a = scene.arrays();
     attach(a);
-    const int every = std::max(1, a.total / (samples * count())), room = a.total / every + 1;
-    Buffer<float4> position(static_cast<std::size_t>(room));
-    Buffer<int> id(static_cast<std::size_t>(room)), found(2);  // samples, speed
-    stream.fill_zero(found.get(), found.bytes());
-    stream.launch(survey_kernel, a.n, Survey{a, every, room, position.get(), id.get(), found.get(), found.get() + 1});
-    stream.wait();
-    const std::vector<int> counted = found.download(2);
-    float square = 0;
-    std::memcpy(&square, &counted[1], sizeof square);
-    fall_ = c.dt * c.dt * std::sqrt(c.gravity.x * c.gravity.x + c.gravity.y * c.gravity.y + c.gravity.z * c.gravity.z);
-    step_ = c.dt * std::sqrt(square) + fall_;
-    for (const double other : ranks_.all(step_)) step_ = std::max(step_, other);
-    const auto n = static_cast<std::size_t>(std::min(counted[0], room));
-    const std::vector<float4> x = position.download(n);
-    const std::vector<int> ids = id.download(n);
-    std::vector<Sample> own;
-    for (std::size_t k = 0; k < n; ++k) own.push_back({ids[k], {{x[k].x, x[k].y, x[k].z}, 1.0f}});
-    choose_boxes(c, own, a.total);
+    return a;
   }
-  void choose_boxes(const Constants& c, const std::vector<Sample>& own, int total) {
-    Writer packed;
-    packed << own;
-    std::vector<Sample> all;
-    for (const Bytes& of_rank : ranks_.gather(packed.take())) {
-      std::vector<Sample> some;
-      Reader(of_rank) >> some;
-      all.insert(all.end(), some.begin(), some.end());
-    }
-    std::vector<Box> boxes;
-    if (ranks_.rank() == 0) {
-      std::ranges::sort(all, {}, &Sample::id);
-      std::vector<WorkSample> work;
-      for (const Sample& s : all) work.push_back(s.work);
-      boxes = bisect(std::move(work), count());
-    }
-    Writer chosen;
-    chosen << boxes;
-    Bytes bytes = chosen.take();
-    ranks_.broadcast(bytes);
-    Reader(bytes) >> boxes;
-    place_boxes(c, boxes, total);
+  static void zero(Stream& stream, std::initializer_list<Buffer<int>*> buffers) {
+    for (Buffer<int>* each : buffers) stream.fill_zero(each->get(), each->bytes());
+  }
+  void survey(Stream& stream, SceneArrays& scene) {
+    decomposition_.survey(stream, scene.constants(), arrays(scene));
     ++statistics_.rebalances;
   }
 
@@ -290,13 +207,12 @@ class Halo {
 
   /// Who needs which particle; how many stay.
   int assign(Stream& stream, SceneArrays& scene) {
-    ParticleArrays a = scene.arrays();
-    attach(a);
+    const ParticleArrays a = arrays(scene);
     const int n = a.n;
     stream.fill_zero(departing_.get(), departing_.bytes());
     stream.fill_zero(ints(a, 0) + n, SortScratch::scan_padding * sizeof(int));
     stream.launch(assign_ranks_kernel, n,
-                  AssignRanks{scene.constants(), a, boxes(), before(a), ints(a, 0), departing_.get()});
+                  AssignRanks{scene.constants(), a, decomposition_.boxes(), before(a), ints(a, 0), departing_.get()});
     Stream::reserve_scan(n + 1, scan_);
     stream.exclusive_scan(ints(a, 0), ints(a, 1), n + 1, scan_);
     stream.wait();
@@ -307,15 +223,14 @@ class Halo {
 
   void migrate(Stream& stream, SceneArrays& scene, const std::vector<int>& departing, const std::vector<int>& arriving,
                int kept) {
-    ParticleArrays a = scene.arrays();
-    attach(a);
+    const ParticleArrays a = arrays(scene);
     travellers_out_.reserve(static_cast<std::size_t>(sum(departing)));
     travellers_in_.reserve(static_cast<std::size_t>(sum(arriving)));
     first_.upload(starts(departing));
     stream.fill_zero(gone_.get(), gone_.bytes());
     stream.launch(depart_kernel, a.n,
-                  Depart{a, boxes(), before(a), ints(a, 0), ints(a, 1), first_.get(), gone_.get(), after(scene),
-                         travellers_out_.get()});
+                  Depart{a, decomposition_.boxes(), before(a), ints(a, 0), ints(a, 1), first_.get(), gone_.get(),
+                         after(scene), travellers_out_.get()});
     transport_.exchange(stream, segments(travellers_out_.get(), departing), segments(travellers_in_.get(), arriving));
     stream.launch(arrive_kernel, sum(arriving), Arrive{a, travellers_in_.get(), kept, after(scene)});
     const auto bytes = static_cast<std::size_t>(kept + sum(arriving)) * sizeof(float4);
@@ -325,14 +240,11 @@ class Halo {
 
   void number(Stream& stream, SceneArrays& scene, int n) {
     scene.set_particles(n);
-    ParticleArrays a = scene.arrays();
-    attach(a);
-    for (Buffer<int>* each : {&sends_counted_, &receives_counted_, &bordering_, &damaged_})
-      stream.fill_zero(each->get(), each->bytes());
+    const ParticleArrays a = arrays(scene);
+    zero(stream, {&sends_counted_, &receives_counted_, &bordering_, &damaged_});
     stream.launch(count_exchanged_kernel, n,
-                  CountExchanged{boxes(), after(scene), sends_counted_.get(), receives_counted_.get(), bordering_.get(),
-                                 damaged_.get()});
-    stream.launch(key_by_id_kernel, n, KeyById{after(scene), ints(a, 0), ints(a, 2)});
+                  CountExchanged{decomposition_.boxes(), after(scene), sends_counted_.get(), receives_counted_.get(),
+                                 bordering_.get(), damaged_.get(), ints(a, 0), ints(a, 2)});
     Pairs pairs{ints(a, 0), ints(a, 1), ints(a, 2), ints(a, 3)};
     stream.sort_pairs(pairs, n, bits_below(a.total), sort_);
     stream.wait();
@@ -340,16 +252,15 @@ class Halo {
     receives_ = counts(receives_counted_);
     borders_ = bordering_.download(1)[0];
     statistics_.ghosts = sum(receives_);
-    statistics_.owned = n - statistics_.ghosts;
+    owned_ = ranks_.all(n - sum(receives_));
     check(a.total);
     reserve_exchange();
-    stream.fill_zero(sends_counted_.get(), sends_counted_.bytes());
-    stream.fill_zero(receives_counted_.get(), receives_counted_.bytes());
-    stream.fill_zero(bordering_.get(), bordering_.bytes());
-    stream.launch(number_by_id_kernel, n,
-                  NumberById{a, boxes(), after(scene), pairs.key, pairs.value, global_id_.get(), role_.get(),
-                             first_send_.get(), first_receive_.get(), sends_counted_.get(), receives_counted_.get(),
-                             send_.get(), receive_.get(), bordering_.get(), border_.get(), damaged_.get()});
+    zero(stream, {&sends_counted_, &receives_counted_, &bordering_});
+    stream.launch(
+        number_by_id_kernel, n,
+        NumberById{a, decomposition_.boxes(), after(scene), pairs.key, pairs.value, global_id_.get(), role_.get(),
+                   first_send_.get(), first_receive_.get(), sends_counted_.get(), receives_counted_.get(), send_.get(),
+                   receive_.get(), bordering_.get(), border_.get(), damaged_.get()});
     sort_parts(stream, send_, sends_, n);
     sort_parts(stream, receive_, receives_, n);
     stream.wait();
@@ -369,8 +280,7 @@ class Halo {
   /// That nothing was lost on the way or came twice, and that both sides expect the same.
   void check(int total) const {
     check_damage();
-    std::int64_t owned = 0;
-    for (const std::int64_t each : ranks_.all(statistics_.owned)) owned += each;
+    const std::int64_t owned = std::accumulate(owned_.begin(), owned_.end(), std::int64_t{0});
     if (owned != total)
       throw BackendError("after a migration the ranks own " + std::to_string(owned) + " of " + std::to_string(total) +
                          " particles");
@@ -403,12 +313,8 @@ class Halo {
     return bits;
   }
   static std::vector<int> starts(const std::vector<int>& parts) {
-    std::vector<int> first;
-    int at = 0;
-    for (const int part : parts) {
-      first.push_back(at);
-      at += part;
-    }
+    std::vector<int> first(parts.size());
+    std::exclusive_scan(parts.begin(), parts.end(), first.begin(), 0);
     return first;
   }
   template <class T>
@@ -427,15 +333,11 @@ class Halo {
 
   Communicator& ranks_;
   Transport transport_;
-  float margin_of_h_, margin_ = 0;  // m
-  bool fresh_ = false;              // the ghosts that there are suffice for the state that there is
-  Box reach_{};
-  bool periodic_ = false;
-  double step_ = 0;  // how far the fastest particle moved in the last substep, m
-  double fall_ = 0;  // and by how much farther in each next one if it falls, m
+  Decomposition decomposition_;
+  bool fresh_ = false;  // the ghosts that there are suffice for the state that there is
   int most_substeps_ = first_substeps;
-  RankStatistics statistics_;
-  Buffer<Box> own_boxes_, reach_boxes_;
+  RankStats statistics_;
+  std::vector<int> owned_;  // by rank, particles
   Buffer<int> global_id_, index_, farthest_;
   Buffer<ParticleRole> role_;
   Buffer<int> border_;  // own particles that others have copies of

@@ -8,22 +8,14 @@
 #include <omp.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
-#include <optional>
-#include <thread>
+#include <span>
+#include <string>
 
 namespace decant::gpu {
 namespace {
 
-enum class Request : int { make, drop, load, evaluate, evaluate_density, advance, read, totals, end };
-
-struct Totals {
-  std::int64_t rebuilds = 0;
-  PairTotals pairs;
-  std::size_t device_bytes = 0;
-  RankStatistics ranks;
-};
+enum class Request : int { make, drop, load, evaluate, evaluate_density, advance, read, stats, end };
 
 Writer header(Request request, int number) {
   Writer writer;
@@ -53,11 +45,12 @@ std::vector<T> owned_rows(std::span<const T> values, std::size_t width, const Ra
 }
 std::vector<int> owned_ids(const RankRows& rows) { return owned_rows(std::span(rows.id), 1, rows); }
 
-void put_problem(Writer& to, const Problem& p) {
+/// All but the particles, of which each rank gets others.
+void put_problem(Writer& to, const Problem& p, const std::vector<Box>& boxes) {
   to << p.constants << p.geometry.shapes << p.geometry.edges << p.geometry.boxes << p.geometry.faces << p.region;
   const std::vector<char> moves(p.walls.container_moves.begin(), p.walls.container_moves.end());
   to << p.walls.x << p.walls.y << p.walls.z << p.walls.container_begin << moves;
-  to << p.particles << p.rank_boxes;
+  to << static_cast<int>(p.position.size() / 3) << boxes;
 }
 Problem get_problem(Reader& from) {
   Problem p{};
@@ -69,27 +62,15 @@ Problem get_problem(Reader& from) {
   return p;
 }
 
-/// A rank's share of a state.
-struct Share {
-  std::vector<float> position, velocity;
-  std::vector<int> id;
-};
-
-std::size_t owner_of(const std::vector<Box>& boxes, const float* x) {
-  for (std::size_t r = 0; r < boxes.size(); ++r) {
-    const Box& b = boxes[r];
-    if (x[0] >= b.min.x && x[0] < b.max.x && x[1] >= b.min.y && x[1] < b.max.y && x[2] >= b.min.z && x[2] < b.max.z)
-      return r;
-  }
-  return 0;
-}
-
-std::vector<Share> shares_of(const Problem& p) {
-  std::vector<Share> shares(p.rank_boxes.size());
+std::vector<Share> shares_of(const Problem& p, const std::vector<Box>& boxes) {
+  std::vector<Share> shares(boxes.size());
   for (std::size_t i = 0; 3 * i < p.position.size(); ++i) {
-    Share& s = shares[owner_of(p.rank_boxes, &p.position[3 * i])];
-    s.position.insert(s.position.end(), &p.position[3 * i], &p.position[3 * i] + 3);
-    s.velocity.insert(s.velocity.end(), &p.velocity[3 * i], &p.velocity[3 * i] + 3);
+    const float *x = &p.position[3 * i], *v = &p.velocity[3 * i];
+    const auto owner = std::ranges::find_if(boxes, [x](const Box& b) { return b.holds({x[0], x[1], x[2]}); });
+    // What is nowhere is the first rank's.
+    Share& s = shares[owner == boxes.end() ? 0 : static_cast<std::size_t>(owner - boxes.begin())];
+    s.position.insert(s.position.end(), x, x + 3);
+    s.velocity.insert(s.velocity.end(), v, v + 3);
     s.id.push_back(static_cast<int>(i));
   }
   return shares;
@@ -103,31 +84,19 @@ std::vector<Box> boxes_for(const Problem& p, int ranks) {
   return bisect(std::move(samples), ranks);
 }
 
-/// Rank 0 hands each rank its share of the particles.
-void scatter(Communicator& ranks, const Problem* whole, Problem& own) {
-  std::vector<Share> shares;
-  const auto size = static_cast<std::size_t>(ranks.size());
-  Bytes packed;
-  if (whole) {
-    shares = shares_of(*whole);
-    std::vector<std::size_t> counts;
-    for (const Share& s : shares) counts.push_back(s.id.size());
-    Writer writer;
-    writer << counts;
-    packed = writer.take();
-  }
-  ranks.broadcast(packed);
-  std::vector<std::size_t> counts;
-  Reader(packed) >> counts;
-  const auto rank = static_cast<std::size_t>(ranks.rank());
+/// Rank 0 hands each rank its share; `rows` is how many each gets.
+void scatter(Communicator& ranks, std::vector<Share>* shares, const std::vector<std::size_t>& rows, Problem& own) {
   const auto send_all = [&](auto Share::* member, auto& to, std::size_t width) {
     using T = typename std::remove_reference_t<decltype(to)>::value_type;
-    std::vector<Segment> send(size), receive(size);
-    to.resize(counts[rank] * width);
-    for (std::size_t r = 1; whole && r < size; ++r)
-      send[r] = {(shares[r].*member).data(), (shares[r].*member).size() * sizeof(T)};
-    if (whole) to = std::move(shares[0].*member);
-    else receive[0] = {to.data(), to.size() * sizeof(T)};
+    std::vector<Segment> send(rows.size()), receive(rows.size());
+    if (shares) {
+      for (std::size_t r = 1; r < rows.size(); ++r)
+        send[r] = {((*shares)[r].*member).data(), rows[r] * width * sizeof(T)};
+      to = std::move((*shares)[0].*member);
+    } else {
+      to.resize(rows[static_cast<std::size_t>(ranks.rank())] * width);
+      receive[0] = {to.data(), to.size() * sizeof(T)};
+    }
     ranks.exchange(send, receive);
   };
   send_all(&Share::position, own.position, 3);
@@ -139,7 +108,7 @@ void scatter(Communicator& ranks, const Problem* whole, Problem& own) {
 
 void DeviceSolver::join(Communicator&) { throw BackendError("this backend does not run on ranks"); }
 
-Bytes RankSide::perform(const Bytes& request, const Problem* problem) {
+Bytes RankSide::perform(const Bytes& request, std::vector<Share>* shares) {
   Reader from(request);
   Writer answer;
   Request what{};
@@ -160,8 +129,10 @@ Bytes RankSide::perform(const Bytes& request, const Problem* problem) {
       solvers_.erase(number);
       break;
     case Request::load: {
+      std::vector<std::size_t> rows;
       Problem share = get_problem(from);
-      scatter(ranks_, problem, share);
+      from >> rows;
+      scatter(ranks_, shares, rows, share);
       own.load(share);
       break;
     }
@@ -192,8 +163,8 @@ Bytes RankSide::perform(const Bytes& request, const Problem* problem) {
       answer << owned_ids(rows) << owned_rows(state.position, 3, rows) << owned_rows(state.velocity, 3, rows);
       break;
     }
-    case Request::totals:
-      answer << Totals{own.rebuilds(), own.pair_totals(), own.device_bytes(), own.rank_statistics()};
+    case Request::stats:
+      answer << own.neighbor_stats();
       break;
     default:
       throw BackendError("rank " + std::to_string(ranks_.rank()) + ": unknown request");
@@ -217,69 +188,32 @@ void RankSide::serve() noexcept {
   solvers_.clear();
 }
 
-std::vector<Bytes> RankTeam::ask(const Bytes& request, const Problem* problem) {
+RankTeam::RankTeam(std::unique_ptr<Communicator> ranks, const MakeSolver& make, std::vector<std::thread> others)
+    : ranks_(std::move(ranks)), own_(*ranks_, make), others_(std::move(others)) {}
+
+RankTeam::~RankTeam() {
+  try {
+    Bytes request = header(Request::end, 0).take();
+    ranks_->broadcast(request);
+  } catch (const std::exception&) {
+    // They have ended already.
+  }
+  for (std::thread& t : others_) t.join();
+}
+
+std::vector<Bytes> RankTeam::ask(const Bytes& request, std::vector<Share>* shares) {
   const std::lock_guard lock(mutex_);
   try {
     Bytes sent = request;
-    ranks().broadcast(sent);
-    return ranks().gather(own().perform(request, problem));
+    ranks_->broadcast(sent);
+    return ranks_->gather(own_.perform(request, shares));
   } catch (const std::exception& e) {
-    ranks().fail(std::string("rank 0: ") + e.what());
+    ranks_->fail(std::string("rank 0: ") + e.what());
     throw;
   }
 }
 
-void RankTeam::dismiss() noexcept {
-  try {
-    Bytes request = header(Request::end, 0).take();
-    ranks().broadcast(request);
-  } catch (const std::exception&) {
-    // They have ended already.
-  }
-}
-
 namespace {
-
-class ThreadTeam : public RankTeam {
- public:
-  ThreadTeam(int size, MakeSolver make) : ranks_(thread_communicators(size)), own_(*ranks_[0], make) {
-    const int cores = std::max(1, omp_get_max_threads() / size);
-    for (int r = 1; r < size; ++r)
-      threads_.emplace_back([this, r, make, cores] {
-        omp_set_num_threads(cores);
-#if DECANT_HAS_CUDA
-        cuda::use_device(r);
-#endif
-        RankSide(*ranks_[static_cast<std::size_t>(r)], make).serve();
-      });
-  }
-  ~ThreadTeam() override {
-    dismiss();
-    for (std::thread& t : threads_) t.join();
-  }
-
- private:
-  Communicator& ranks() const override { return *ranks_[0]; }
-  RankSide& own() override { return own_; }
-
-  std::vector<std::unique_ptr<Communicator>> ranks_;
-  RankSide own_;
-  std::vector<std::thread> threads_;
-};
-
-class ProcessTeam : public RankTeam {
- public:
-  ProcessTeam(std::unique_ptr<Communicator> ranks, MakeSolver make)
-      : ranks_(std::move(ranks)), own_(*ranks_, std::move(make)) {}
-  ~ProcessTeam() override { dismiss(); }
-
- private:
-  Communicator& ranks() const override { return *ranks_; }
-  RankSide& own() override { return own_; }
-
-  std::unique_ptr<Communicator> ranks_;
-  RankSide own_;
-};
 
 class RankedSolver : public DeviceSolver {
  public:
@@ -298,13 +232,15 @@ class RankedSolver : public DeviceSolver {
   }
 
   void load(const Problem& problem) override {
-    Problem whole = problem;
-    whole.particles = static_cast<int>(problem.position.size() / 3);
-    whole.rank_boxes = boxes_for(problem, team_->size());
+    const std::vector<Box> boxes = boxes_for(problem, team_->size());
+    std::vector<Share> shares = shares_of(problem, boxes);
+    std::vector<std::size_t> rows;
+    for (const Share& s : shares) rows.push_back(s.id.size());
     Writer request = header(Request::load, number_);
-    put_problem(request, whole);
-    team_->ask(request.take(), &whole);
-    particles_ = static_cast<std::size_t>(whole.particles);
+    put_problem(request, problem, boxes);
+    request << rows;
+    team_->ask(request.take(), &shares);
+    particles_ = problem.position.size() / 3;
     loaded_ = true;
   }
   Status evaluate(const std::vector<DevicePose>& poses, const GivenInputs& given, HostFields& out) override {
@@ -335,34 +271,22 @@ class RankedSolver : public DeviceSolver {
     return {position_, velocity_};
   }
   StageTimes stage_times() const override { return team_->own_solver(number_).stage_times(); }
-  std::int64_t rebuilds() const override {
-    std::int64_t most = 0;
-    for (const Totals& t : totals()) most = std::max(most, t.rebuilds);
-    return most;
-  }
-  PairTotals pair_totals() const override {
-    PairTotals sum;
-    for (const Totals& t : totals()) {
-      sum.pairs += t.pairs.pairs;
-      sum.missed += t.pairs.missed;
-      sum.wall_pairs += t.pairs.wall_pairs;
-      sum.wall_missed += t.pairs.wall_missed;
-    }
-    return sum;
-  }
-  std::size_t device_bytes() const override {
-    std::size_t sum = 0;
-    for (const Totals& t : totals()) sum += t.device_bytes;
-    return sum;
-  }
-  RankStatistics rank_statistics() const override {
-    RankStatistics all;
-    for (const Totals& t : totals()) {
-      all.owned += t.ranks.owned;
-      all.ghosts += t.ranks.ghosts;
-      all.refreshes = std::max(all.refreshes, t.ranks.refreshes);
-      all.rebalances = std::max(all.rebalances, t.ranks.rebalances);
-      all.largest_imbalance = std::max(all.largest_imbalance, t.ranks.largest_imbalance);
+  /// Sums over ranks, or the most of any where all do the same.
+  NeighborStats neighbor_stats() const override {
+    NeighborStats all;
+    for (const Bytes& bytes : team_->ask(header(Request::stats, number_).take())) {
+      NeighborStats own;
+      Reader(bytes) >> own;
+      all.rebuilds = std::max(all.rebuilds, own.rebuilds);
+      all.device_bytes += own.device_bytes;
+      all.verified.pairs += own.verified.pairs;
+      all.verified.missed += own.verified.missed;
+      all.verified.wall_pairs += own.verified.wall_pairs;
+      all.verified.wall_missed += own.verified.wall_missed;
+      all.ranks.ghosts += own.ranks.ghosts;
+      all.ranks.migrations = std::max(all.ranks.migrations, own.ranks.migrations);
+      all.ranks.rebalances = std::max(all.ranks.rebalances, own.ranks.rebalances);
+      all.ranks.largest_imbalance = std::max(all.ranks.largest_imbalance, own.ranks.largest_imbalance);
     }
     return all;
   }
@@ -370,11 +294,6 @@ class RankedSolver : public DeviceSolver {
  private:
   void require_loaded() const {
     if (!loaded_) throw BackendError("nothing is loaded");
-  }
-  std::vector<Totals> totals() const {
-    std::vector<Totals> all;
-    for (const Bytes& bytes : team_->ask(header(Request::totals, number_).take())) Reader(bytes) >> all.emplace_back();
-    return all;
   }
   Status fields(Request what, const std::vector<DevicePose>& poses, const GivenInputs& given, HostFields& out) {
     require_loaded();
@@ -426,12 +345,19 @@ class RankedSolver : public DeviceSolver {
 
 }  // namespace
 
-std::shared_ptr<RankTeam> make_thread_team(int ranks, MakeSolver make) {
-  return std::make_shared<ThreadTeam>(ranks, std::move(make));
-}
-
-std::shared_ptr<RankTeam> make_process_team(std::unique_ptr<Communicator> ranks, MakeSolver make) {
-  return std::make_shared<ProcessTeam>(std::move(ranks), std::move(make));
+std::shared_ptr<RankTeam> make_thread_team(int ranks, const MakeSolver& make) {
+  auto communicators = thread_communicators(ranks);
+  const int cores = std::max(1, omp_get_max_threads() / ranks);
+  std::vector<std::thread> others;
+  for (int r = 1; r < ranks; ++r)
+    others.emplace_back([own = std::move(communicators[static_cast<std::size_t>(r)]), make, cores] {
+      omp_set_num_threads(cores);
+#if DECANT_HAS_CUDA
+      cuda::use_device(own->rank());
+#endif
+      RankSide(*own, make).serve();
+    });
+  return std::make_shared<RankTeam>(std::move(communicators[0]), make, std::move(others));
 }
 
 std::unique_ptr<DeviceSolver> make_on_ranks(std::shared_ptr<RankTeam> team, const SolverChoice& choice) {

@@ -30,7 +30,7 @@ class SceneArrays {
     }
     load_geometry(problem.geometry);
     load_walls(problem.walls);
-    allocate();
+    allocate(0);
     upload_rows(state_.position, problem.position, [this](float square) { return stores_square_ ? square : c_.mass; });
     upload_rows(state_.velocity, problem.velocity, [](float) { return 0.0f; });
     std::vector<int> ids(id_.size());
@@ -48,17 +48,8 @@ class SceneArrays {
   int room() const { return room_; }
   /// More room; the state is still there, walls are to be placed again.
   void grow(int room) {
-    const auto n = static_cast<std::size_t>(n_);
     room_ = room;
-    const auto all = static_cast<std::size_t>(sentinel()) + 1 + read_past_end, some = static_cast<std::size_t>(room_);
-    state_.position.grow(all, n);
-    state_.velocity.grow(some, n);
-    id_.grow(some, n);
-    spare_.position.resize(all);
-    spare_.velocity.resize(some);
-    force_position_.resize(all);
-    force_velocity_.resize(all);
-    saved_.resize(some * saved_bytes);
+    allocate(static_cast<std::size_t>(n_));
     place_sentinel();
   }
   /// Room for 32 bytes per particle, between advances.
@@ -185,14 +176,19 @@ class SceneArrays {
     walls_.walls = {wall_local_.get(), wall_id_.get(), wall_container_.get(), wall_volume_.get(), c_.rest_density};
   }
 
-  void allocate() {
+  /// For as many particles as there is room for; the state of the first `kept` is still there.
+  void allocate(std::size_t kept) {
+    const auto keep = [kept](auto& buffer, std::size_t size) {
+      if (kept > 0) buffer.grow(size, kept);
+      else buffer.resize(size);
+    };
     const auto n = static_cast<std::size_t>(room_);
     const auto all = static_cast<std::size_t>(sentinel()) + 1 + read_past_end;
-    state_.position.resize(all);
-    state_.velocity.resize(n);
+    keep(state_.position, all);
+    keep(state_.velocity, n);
+    keep(id_, n);
     spare_.position.resize(all);
     spare_.velocity.resize(n);
-    id_.resize(n);
     force_position_.resize(all);
     force_velocity_.resize(all);
     saved_.resize(n * saved_bytes);

@@ -57,8 +57,7 @@ class Solver : public DeviceSolver {
   }
 
   Status evaluate(const std::vector<DevicePose>& poses, const GivenInputs& given, HostFields& out) override {
-    require_loaded();
-    if (halo_ && !halo_->fresh()) refresh_halo();
+    require_current();
     std::vector<float> own_volume = scene_.boundary_volumes();
     if (!given.boundary_volume.empty()) {
       scene_.set_boundary_volumes(given.boundary_volume);
@@ -76,8 +75,7 @@ class Solver : public DeviceSolver {
   }
 
   Status evaluate_density(const std::vector<DevicePose>& poses, HostFields& out) override {
-    require_loaded();
-    if (halo_ && !halo_->fresh()) refresh_halo();
+    require_current();
     const DeviceStatus status = compute(poses, [&]<bool periodic>(std::bool_constant<periodic>) {
       const ParticleArrays a = arrays();
       find_neighbors<periodic>(a, {});
@@ -109,11 +107,15 @@ class Solver : public DeviceSolver {
   StateRows read() override { return scene_.read(stream_); }
 
   StageTimes stage_times() const override { return times_; }
-  std::int64_t rebuilds() const override { return rebuilds_; }
-  PairTotals pair_totals() const override { return totals_; }
-  std::size_t device_bytes() const override { return scene_.bytes() + search_.bytes() + (halo_ ? halo_->bytes() : 0); }
+  NeighborStats neighbor_stats() const override {
+    NeighborStats stats;
+    stats.rebuilds = rebuilds_;
+    stats.verified = totals_;
+    stats.device_bytes = static_cast<std::int64_t>(scene_.bytes() + search_.bytes() + (halo_ ? halo_->bytes() : 0));
+    if (halo_) stats.ranks = halo_->statistics();
+    return stats;
+  }
   RankRows rank_rows() const override { return halo_ ? halo_->rows(scene_.particles()) : RankRows(); }
-  RankStatistics rank_statistics() const override { return halo_ ? halo_->statistics() : RankStatistics(); }
 
  private:
   // Substeps of the long graph: launching it is then cheap beside running it.
@@ -132,6 +134,11 @@ class Solver : public DeviceSolver {
   const Constants& c() const { return scene_.constants(); }
   void require_loaded() const {
     if (!loaded_) throw BackendError("nothing is loaded");
+  }
+  /// Loaded, and on ranks with the ghosts that the state needs.
+  void require_current() {
+    require_loaded();
+    if (halo_ && !halo_->fresh()) refresh_halo();
   }
   ParticleArrays arrays() {
     ParticleArrays a = scene_.arrays();
