@@ -30,7 +30,9 @@ int crossings_below(const std::vector<ProfileEdge>& edges, double r, double z) {
   return count;
 }
 
-SurfaceDistance revolved_distance(const std::vector<ProfileEdge>& edges, const Vec3& x) {
+/// \param inside  (r, z) → whether a point is in the solid
+template <class Inside>
+SurfaceDistance revolved_distance(const std::vector<ProfileEdge>& edges, const Vec3& x, Inside inside) {
   const double r = std::hypot(x.x(), x.y()), z = x.z();
   Nearest best{0, 0, std::numeric_limits<double>::infinity()};
   const ProfileEdge* nearest_edge = &edges.front();
@@ -41,9 +43,8 @@ SurfaceDistance revolved_distance(const std::vector<ProfileEdge>& edges, const V
       nearest_edge = &e;
     }
   }
-  const bool inside = crossings_outward(edges, r, z) % 2 == 1;
   const double d = std::sqrt(best.squared);
-  const double sign = inside ? -1.0 : 1.0;
+  const double sign = inside(r, z) ? -1.0 : 1.0;
   double normal_r, normal_z;
   if (d > 1e-12) {
     normal_r = sign * (r - best.r) / d;
@@ -58,22 +59,27 @@ SurfaceDistance revolved_distance(const std::vector<ProfileEdge>& edges, const V
   return {sign * d, normal_r * meridian + Vec3(0, 0, normal_z)};
 }
 
-SurfaceDistance box_distance(const std::vector<BoxFace>& faces, const std::vector<SolidBox>& solid, const Vec3& x) {
+Vec3 offset_from(const BoxFace& face, const Vec3& x) { return x - x.cwiseMax(face.min).cwiseMin(face.max); }
+
+/// \param inside  x → whether it is in the solid
+template <class Inside>
+SurfaceDistance box_distance(const std::vector<BoxFace>& faces, const Vec3& x, Inside inside) {
   double best = std::numeric_limits<double>::infinity();
   Vec3 offset = Vec3::Zero();
-  BoxFace at{};
+  const BoxFace* at = &faces.front();
   for (const auto& face : faces) {
-    const Vec3 to_x = x - x.cwiseMax(face.min).cwiseMin(face.max);
-    if (to_x.squaredNorm() < best) {
-      best = to_x.squaredNorm();
+    const Vec3 to_x = offset_from(face, x);
+    const double squared = to_x.squaredNorm();
+    if (squared < best) {
+      best = squared;
       offset = to_x;
-      at = face;
+      at = &face;
     }
   }
   const double d = std::sqrt(best);
-  const double sign = in_solid(solid, x) ? -1.0 : 1.0;
+  const double sign = inside(x) ? -1.0 : 1.0;
   if (d > 1e-12) return {sign * d, sign * offset / d};
-  return {0.0, at.side * Vec3::Unit(at.axis)};
+  return {0.0, at->side * Vec3::Unit(at->axis)};
 }
 
 }  // namespace
@@ -100,7 +106,35 @@ SolidDistance::SolidDistance(const Container& container)
 }
 
 SurfaceDistance SolidDistance::at(const Vec3& local) const {
-  return revolved_ ? revolved_distance(edges_, local) : box_distance(faces_, box_.solid, local);
+  if (revolved_)
+    return revolved_distance(edges_, local,
+                             [&](double r, double z) { return crossings_outward(edges_, r, z) % 2 == 1; });
+  return box_distance(faces_, local, [&](const Vec3& x) { return in_solid(box_.solid, x); });
+}
+
+SolidDistance::Nearby SolidDistance::nearby(const Vec3& around, double distance, double radius) const {
+  Nearby nearby(*this);
+  const double rounding = 1e-12 * (around.norm() + low_.norm() + high_.norm() + radius);
+  const double farthest = std::abs(distance) + 2 * radius + rounding, squared = farthest * farthest;
+  if (revolved_) {
+    const double r = std::hypot(around.x(), around.y());
+    for (const ProfileEdge& e : edges_)
+      if (!(nearest_on(e, r, around.z()).squared > squared)) nearby.edges_.push_back(e);
+  } else {
+    for (const BoxFace& f : faces_)
+      if (!(offset_from(f, around).squaredNorm() > squared)) nearby.faces_.push_back(f);
+  }
+  if (std::abs(distance) > radius + rounding) nearby.sign_ = distance < 0 ? -1 : 1;
+  return nearby;
+}
+
+SurfaceDistance SolidDistance::Nearby::at(const Vec3& local) const {
+  if (solid_.revolved_)
+    return revolved_distance(edges_, local, [&](double r, double z) {
+      return sign_ == 0 ? crossings_outward(solid_.edges_, r, z) % 2 == 1 : sign_ < 0;
+    });
+  return box_distance(faces_, local,
+                      [&](const Vec3& x) { return sign_ == 0 ? in_solid(solid_.box_.solid, x) : sign_ < 0; });
 }
 
 bool SolidDistance::in_cavity(const Vec3& local) const {

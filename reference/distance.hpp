@@ -26,6 +26,12 @@ class SolidDistance {
   /// \param local  3, m, container frame
   SurfaceDistance at(const Vec3& local) const;
 
+  class Nearby;
+  /// For many questions close to one place.
+  /// \param around  3, m, container frame; \param distance  m, what `at` says there; \param radius  m, of the
+  /// points that are to be asked
+  Nearby nearby(const Vec3& around, double distance, double radius) const;
+
   /// True where the point lies in the container's room for fluid, solid excluded: below the highest
   /// rim, with solid beneath it and solid farther from the axis at the same height (revolved), or
   /// in the cavity box.
@@ -43,6 +49,24 @@ class SolidDistance {
   BoxShape box_;                    // boxes
   std::vector<BoxFace> faces_;
   Vec3 low_, high_;
+};
+
+/// A solid for the points within a radius of a place: `at` gives what the solid's own does, bit for bit, from the
+/// edges or faces that are nearest to one of these points. One that is farther from the place than the nearest by
+/// more than twice the radius is nearest to none of them, as no distance changes by more than the point moves; for
+/// the same reason all of them are on one side of a surface that is farther than the radius.
+class SolidDistance::Nearby {
+ public:
+  SurfaceDistance at(const Vec3& local) const;
+
+ private:
+  friend class SolidDistance;
+  explicit Nearby(const SolidDistance& solid) : solid_(solid) {}
+
+  const SolidDistance& solid_;
+  std::vector<ProfileEdge> edges_;
+  std::vector<BoxFace> faces_;
+  double sign_ = 0;  // of all distances; 0: either
 };
 
 /// SolidDistance(container).at(local), for a single point.

@@ -227,6 +227,26 @@ TEST_P(EverySolid, IsNeverNearerThanItsBoundingBoxAllows) {
   }
 }
 
+/// The answers beside edges, inside and out, at the surface and far from it.
+TEST_P(EverySolid, GivesTheSameBitsToQuestionsCloseToOnePlace) {
+  const SolidDistance solid(solid_);
+  const Eigen::Matrix3Xd points = cloud(7, 600, -0.1, 0.25), ways = cloud(8, 600, -1, 1);
+  for (const double radius : {1e-9, 1e-5, 0.003, 0.05})
+    for (Eigen::Index k = 0; k < points.cols(); ++k)
+      for (const bool at_surface : {false, true}) {
+        Vec3 around = points.col(k);
+        if (at_surface) around -= solid.at(around).distance * solid.at(around).normal;
+        const SolidDistance::Nearby nearby = solid.nearby(around, solid.at(around).distance, radius);
+        for (Eigen::Index j = 0; j < 8; ++j) {
+          const Vec3 way = ways.col((7 * k + j) % ways.cols());
+          const Vec3 local = around + (j == 0 ? 0 : radius / way.norm()) * way;
+          const SurfaceDistance expected = solid.at(local), got = nearby.at(local);
+          ASSERT_EQ(got.distance, expected.distance) << local.transpose() << ", radius " << radius;
+          ASSERT_EQ(got.normal, expected.normal) << local.transpose() << ", radius " << radius;
+        }
+      }
+}
+
 TEST(Cavity, IsTheRoomForFluidAndNothingElse) {
   for (const Vec3& x : {Vec3(0, 0, 0.01), Vec3(0.049, 0, 0.099), Vec3(-0.03, 0.03, 0.05)})
     EXPECT_TRUE(in_cavity(cup(), x)) << x.transpose();
