@@ -130,15 +130,13 @@ class Probes {
     Eigen::Index n = 0;
     for (Eigen::Index i = 0; i < state.size(); ++i) {
       const Vec3 x = state.position.col(i), v = state.velocity.col(i);
-      std::vector<SubstepOutcome> first, later;
-      bool stays = inside(scene_.domain, x, scene_.particle_spacing);
-      const bool known = follow(x, v, 1, first, stays), known_later = follow(x, v, contact_run, later, stays);
-      if (!known || !stays) continue;
-      if (known_later) {
+      Followed first, later;
+      if (!follow(x, v, first, later) || !first.known) continue;
+      if (later.known) {
         problem.later_id.push_back(n);
-        problem.later.push_back(std::move(later));
+        problem.later.push_back(std::move(later.outcomes));
       }
-      problem.first.push_back(std::move(first));
+      problem.first.push_back(std::move(first.outcomes));
       state.position.col(n) = x;
       state.velocity.col(n++) = v;
     }
@@ -212,27 +210,53 @@ class Probes {
     add(x - steps * dt * v, v);
   }
 
-  /// Outcomes so many substeps on; false where contacts cannot be told. One that leaves the domain does not
-  /// stay.
-  bool follow(const Vec3& x, const Vec3& v, int substeps, std::vector<SubstepOutcome>& outcomes, bool& stays) const {
+  /// A probe so many substeps on, by the decisions of `flips`; visit(k, particle) after each.
+  template <class Visit>
+  BoundedParticle run(const Vec3& x, const Vec3& v, int substeps, unsigned flips, Visit visit) const {
+    BoundedParticle p{x, v, {}, {}};
+    p.flips = flips;
+    for (int k = 1; k <= substeps; ++k) {
+      p.tau_v.add(Vec3::Constant(scene_.time_step() * force_free_acceleration));
+      bounds_.fly(p);
+      bounds_.collide(poses_[static_cast<std::size_t>(k)], p);
+      visit(k, p);
+    }
+    return p;
+  }
+
+  /// Outcomes of a probe, and whether its contacts can be told.
+  struct Followed {
+    std::vector<SubstepOutcome> outcomes;
     bool known = true;
-    const auto run = [&](unsigned flips) {
-      BoundedParticle p{x, v, Vec3::Zero(), Vec3::Zero()};
-      p.flips = flips;
-      for (int k = 1; k <= substeps; ++k) {
-        p.tau_v.array() += scene_.time_step() * force_free_acceleration;
-        bounds_.fly(p);
-        bounds_.collide(poses_[static_cast<std::size_t>(k)], p);
-        stays = stays && inside(scene_.domain, p.x, 0.1 * scene_.particle_spacing);
-      }
-      return p;
-    };
-    each_decision(run, [&](const BoundedParticle& p) {
-      outcomes.push_back({p.x, p.v, p.tau_x, p.tau_v});
+
+    void add(const BoundedParticle& p) {
+      outcomes.push_back({p.x, p.v, p.tau_x.components, p.tau_v.components});
       known = known && !p.ambiguous && p.undecided <= most_undecided;
-    });
-    gather_images(scene_.domain, outcomes);
-    return known;
+    }
+  };
+  /// One substep on and all of them; false where it leaves the domain on any way.
+  bool follow(const Vec3& x, const Vec3& v, Followed& first, Followed& later) const {
+    bool stays = inside(scene_.domain, x, scene_.particle_spacing), one_way = true;
+    const auto stays_at = [&](const BoundedParticle& p) {
+      stays = stays && inside(scene_.domain, p.x, 0.1 * scene_.particle_spacing);
+    };
+    each_decision(
+        [&](unsigned flips) {
+          return run(x, v, contact_run, flips, [&](int k, const BoundedParticle& p) {
+            stays_at(p);
+            if (k > 1 || flips > 0) return;
+            one_way = p.undecided == 0;
+            if (one_way) first.add(p);
+          });
+        },
+        [&](const BoundedParticle& p) { later.add(p); });
+    if (!one_way)
+      each_decision(
+          [&](unsigned flips) { return run(x, v, 1, flips, [&](int, const BoundedParticle& p) { stays_at(p); }); },
+          [&](const BoundedParticle& p) { first.add(p); });
+    gather_images(scene_.domain, first.outcomes);
+    gather_images(scene_.domain, later.outcomes);
+    return stays;
   }
 
   Scene scene_;

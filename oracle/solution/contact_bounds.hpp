@@ -13,18 +13,31 @@
 
 namespace decant {
 
-/// A particle, and how far a correct fp32 code may be from it, component by component.
+/// How far a vector may be from its own, both ways at once: by component, and as a length.
+struct VectorBound {
+  Vec3 components = Vec3::Zero();
+  double length = 0;
+
+  void add(const Vec3& more) {
+    components += more;
+    length += more.norm();
+  }
+  /// In any direction alike by so much.
+  static VectorBound ball(double radius) { return {Vec3::Constant(radius), radius}; }
+};
+
+/// A particle, and how far a correct fp32 code may be from it.
 struct BoundedParticle {
-  Vec3 x, v;               // m, m/s
-  Vec3 tau_x, tau_v;       // m, m/s
-  bool ambiguous = false;  // the nearest face cannot be told
-  /// Contacts that fp32 cannot decide, so far; bit k of `flips` turns the k-th round.
+  Vec3 x, v;                 // m, m/s
+  VectorBound tau_x, tau_v;  // m, m/s
+  bool ambiguous = false;    // the nearest face cannot be told
+  /// Contacts that fp32 cannot decide and that matter, so far; bit k of `flips` turns the k-th round.
   int undecided = 0;
   unsigned flips = 0;
   double pushed = 0;  // m, all pushes together
 
-  /// Whether there is contact at this distance, known within e.
-  bool touches(double distance, double reach, double e);
+  /// Takes in what another answer to the same gives.
+  void take_in(const BoundedParticle& other);
 };
 
 /// Undecidable contacts of one particle that are tried both ways; one with more is ambiguous.
@@ -58,13 +71,17 @@ void each_decision(Run run, Take take) {
 ///               of distances, each rounded by 3u, from a nearest point rounded by 4u X, X the largest among |l| and
 ///               the surface's coordinates; so that the nearest point of a neighbor s along may be taken
 ///   tau_x    <- |tau_x| + epsilon + (phi_c − phi)(tau_n + 2u) + 2u|x|: the way out cancels the error
-///               along the normal
+///               along the normal. Lengths are carried on as lengths, not as a cube's diagonal
 ///   tau_wall  = |omega| (|tau_x| + 4u (|x| + |pivot| + |x − pivot|)) + 3u (|v_linear| + |v_surface| +
 ///               |v_wall|)
 ///   tau_v    <- (1 + k)|tau_v| + (2 + k) tau_wall + (2 + 2e + k)|w| tau_n + 8u (1 + e + k)|w| +
 ///               4u (|v_wall| + |v|), w the velocity relative to the wall; unchanged where w points away
 ///               from the wall by more than its own error. The response is continuous and piecewise
 ///               smooth in w, with a slope of 1 + k at most.
+///
+/// Contact within |tau_x| + epsilon of phi_c cannot be decided. What has just been pushed there is always such a
+/// case, and nearly the same either way: where velocities, too, differ by tau_v at most, both ways are one answer,
+/// with a bound that holds them both. Else each is an answer of its own.
 class ContactBounds {
  public:
   explicit ContactBounds(const Scene& scene);
@@ -85,7 +102,14 @@ class ContactBounds {
   const std::vector<BoxFace>& faces(std::size_t container) const { return faces_[container]; }
 
  private:
+  enum class Contact { none, certain, either };
+
   void contact(std::size_t container, const Pose& pose, BoundedParticle& p) const;
+  /// Responds where there is contact at this distance, known within e. respond(particle)
+  template <class Respond>
+  Contact meet(double distance, double e, BoundedParticle& p, Respond respond) const;
+  void respond_to(std::size_t container, const SurfaceDistance& surface, const Vec3& local, const Pose& pose,
+                  double epsilon, BoundedParticle& p) const;
   /// \param epsilon  m; \param tau_n  of the normal
   void respond(double distance, const Vec3& normal, const Pose& pose, double epsilon, double tau_n,
                BoundedParticle& p) const;

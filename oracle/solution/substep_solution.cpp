@@ -29,7 +29,7 @@ SubstepSolution substep_solution(const Scene& scene, const ParticleState& state,
   for (std::size_t k = 0; k < n; ++k) {
     const auto i = static_cast<Eigen::Index>(k);
     const auto run = [&](unsigned flips) {
-      BoundedParticle p{state.position.col(i), state.velocity.col(i), Vec3::Zero(), Vec3::Zero()};
+      BoundedParticle p{state.position.col(i), state.velocity.col(i), {}, {}};
       p.flips = flips;
       bounds.accelerate(fields.fields.acceleration.col(i), fields.tolerance.acceleration.col(i), p);
       bounds.fly(p);
@@ -37,7 +37,7 @@ SubstepSolution substep_solution(const Scene& scene, const ParticleState& state,
       return p;
     };
     each_decision(run, [&](const BoundedParticle& p) {
-      solution.outcomes[k].push_back({p.x, p.v, p.tau_x, p.tau_v});
+      solution.outcomes[k].push_back({p.x, p.v, p.tau_x.components, p.tau_v.components});
       if (!p.ambiguous && p.undecided <= most_undecided) return;
       solution.ambiguous[k] = true;
       solution.longest_push = std::max(solution.longest_push, p.pushed);
