@@ -173,7 +173,7 @@ PreparedReference prepare_reference(const Fixture& fixture, const CheckSelection
   const bool runs = wanted({"trajectory", "mass", "containment", "determinism"});
   if (runs || wanted({"advanced"})) prepared.segments = segments_of(fixture, sample_every);
   if (runs) {
-    Solver solver(scene, prepared.walls, fixture.state);
+    Solver solver(scene, prepared.walls, fixture.state, volumes.volume);
     run_ahead(fixture, prepared, [&](int substeps) {
       for (int k = 0; k < substeps; ++k) solver.substep();
       return solver.state();
