@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 #include <omp.h>
+#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <atomic>
@@ -41,6 +42,9 @@ class Running {
   }
 
   Campaign run() {
+    // A case is too small to be shared, and who waits for a share of it keeps a core from the next one.
+    std::optional<tbb::global_control> alone;
+    if (s_.one_core_each) alone.emplace(tbb::global_control::max_allowed_parallelism, 1);
     std::vector<std::thread> threads;
     for (int t = 0; t < s_.threads; ++t) threads.emplace_back([this] { work(); });
     for (auto& thread : threads) thread.join();

@@ -196,7 +196,7 @@ const std::vector<Property>& properties() {
   static const std::vector<Property> all = {
       {"fields", "every field of every particle is the oracle's, within its tolerance", 1, true},
       {"substep", "one substep moves every particle as the oracle moves it", 1, true},
-      {"contact", "walls push and rub as the oracle's do, whatever led to the contact", 2, true},
+      {"contact", "walls push and rub as the oracle's do, whatever led to the contact", 4, true},
       {"advanced", "fields of what a run leaves in use are the oracle's at the state it ends in", 2, true},
       {"conservation", "forces between fluid particles sum to zero", 1, true},
       {"mass", "every particle is there once, finite, in one place", 4, true},
