@@ -35,7 +35,7 @@ class NeighborList {
     const CellTable table = table_.whole();
     fluid_.prepare(stream, table, room_, scratch_);
     if (o_.verify) checker_.prepare(stream, table, room_, scratch_);
-    origin_.resize(static_cast<std::size_t>(room_) + read_past_end);
+    stream.resize(origin_, static_cast<std::size_t>(room_) + read_past_end);
     if (criterion() == Criterion::relative) {
       bucket_.resize(static_cast<std::size_t>(room_));
       boxes_.resize(2 * static_cast<std::size_t>(table.supers()));

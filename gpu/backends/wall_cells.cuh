@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 
 namespace decant::gpu {
 namespace {
@@ -22,11 +23,20 @@ class WallCells {
     bool rebuild_moving;
     bool list_near;  // by cell, which wall particles may be within reach of it
     float reach;     // m
+
+    bool operator==(const Plan&) const = default;
   };
 
-  /// Fills in the segments of the store, and finds wall volumes.
+  /// Fills in the segments of the store, and finds wall volumes; where all is as it was the last time, they are
+  /// still there.
   void prepare(Stream& stream, const Constants& c, const ParticleArrays& a, WallStore& store, const Plan& plan,
                SortScratch& scratch) {
+    const Prepared wanted{c, a.base, plan, store.version};
+    if (prepared_ == wanted && !a.on_ranks()) {
+      store.segments = prepared_segments_;
+      return;
+    }
+    prepared_.reset();  // should anything below fail
     plan_ = plan;
     moves_ = store.moves;
     grids_.clear();
@@ -61,7 +71,9 @@ class WallCells {
     }
     segments_.upload(store.segments);
     stream.wait();
-    if (any) return;
+    if (any) return;  // whose cells are of another time each time
+    prepared_ = wanted;
+    prepared_segments_ = store.segments;
     from_.resize(0);
     from_id_.resize(0);
     room_.resize(0);
@@ -156,11 +168,23 @@ class WallCells {
   }
 
   FrameWallSource frame_source(const Walls& walls, const WallSegment& s) const {
-    return {from_.get() + s.begin, from_id_.get() + s.begin, walls.local + s.begin, walls.id + s.begin,
-            room_.get() + s.begin};
+    return {from_.get() + s.begin, from_id_.get() + s.begin, walls.local + s.begin,
+            walls.id + s.begin,    room_.get() + s.begin,    s.first_id};
   }
 
+  /// What the cells and volumes follow from.
+  struct Prepared {
+    Constants c;
+    int base;
+    Plan plan;
+    std::uint64_t version;
+
+    bool operator==(const Prepared&) const = default;
+  };
+
   Plan plan_{};
+  std::optional<Prepared> prepared_;
+  std::vector<WallSegment> prepared_segments_;
   std::vector<bool> moves_;
   std::vector<std::unique_ptr<CellSort>> grids_;
   std::vector<std::unique_ptr<Buffer<int>>> near_;

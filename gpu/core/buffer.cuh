@@ -8,6 +8,7 @@
 #include "gpu/core/cuda_check.hpp"
 #endif
 
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -18,6 +19,44 @@ namespace {
 /// The calling thread's own, so that backends on several threads wait for nobody else's work. Whoever
 /// hands a backend to another thread does so between its calls, at whose end all is done.
 inline const cudaStream_t own_stream = cudaStreamPerThread;
+
+/// Small blocks that this thread's buffers gave back, for buffers of exactly their size: whoever loads small problems
+/// one after the other asks for the same sizes again and again, and threads that ask the driver wait for each other.
+class SpareBlocks {
+ public:
+  SpareBlocks() = default;
+  SpareBlocks(const SpareBlocks&) = delete;
+  SpareBlocks& operator=(const SpareBlocks&) = delete;
+  ~SpareBlocks() {
+    for (const auto& [bytes, block] : blocks_) cudaFreeAsync(block, own_stream);
+  }
+  static SpareBlocks& of_this_thread() {
+    thread_local SpareBlocks blocks;
+    return blocks;
+  }
+
+  void* take(std::size_t bytes) {
+    const auto at = blocks_.find(bytes);
+    if (at == blocks_.end()) return nullptr;
+    void* block = at->second;
+    blocks_.erase(at);
+    total_ -= bytes;
+    return block;
+  }
+  /// False where it is not kept.
+  bool keep(void* block, std::size_t bytes) {
+    if (bytes > largest || total_ + bytes > most) return false;
+    blocks_.emplace(bytes, block);
+    total_ += bytes;
+    return true;
+  }
+
+ private:
+  static constexpr std::size_t largest = 1u << 20, most = 64u << 20;
+
+  std::unordered_multimap<std::size_t, void*> blocks_;
+  std::size_t total_ = 0;
+};
 #endif
 
 /// From device memory; all of it is there when the call returns.
@@ -43,12 +82,15 @@ class Buffer {
 
   /// New contents are undefined; every byte is set to 0xFF, which reads as NaN or −1.
   void resize(std::size_t n) {
-    if (n != size_) {
-      release();
-      if (n > 0) data_ = static_cast<T*>(allocate(n * sizeof(T)));
-      size_ = n;
-    }
+    set_size(n);
     fill_ones(data_, size_ * sizeof(T));
+  }
+  /// The same, for who fills it.
+  void set_size(std::size_t n) {
+    if (n == size_) return;
+    release();
+    if (n > 0) data_ = static_cast<T*>(allocate(n * sizeof(T)));
+    size_ = n;
   }
   /// At least so many elements, contents undefined; with a fifth more, so that it seldom happens.
   void reserve(std::size_t n) {
@@ -84,8 +126,8 @@ class Buffer {
  private:
 #ifdef __CUDACC__
   static void* allocate(std::size_t bytes) {
-    void* p = nullptr;
-    CUDA_CHECK(cudaMallocAsync(&p, bytes, own_stream));
+    void* p = SpareBlocks::of_this_thread().take(bytes);
+    if (!p) CUDA_CHECK(cudaMallocAsync(&p, bytes, own_stream));
     return p;
   }
   static void fill_ones(void* p, std::size_t bytes) {
@@ -99,7 +141,8 @@ class Buffer {
     if (bytes) CUDA_CHECK(cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToDevice, own_stream));
   }
   void release() {
-    if (data_) cudaFreeAsync(data_, own_stream);  // a destructor has nobody to report to
+    if (data_ && !SpareBlocks::of_this_thread().keep(data_, size_ * sizeof(T)))
+      cudaFreeAsync(data_, own_stream);  // a destructor has nobody to report to
     data_ = nullptr;
     size_ = 0;
   }
@@ -133,10 +176,11 @@ class PinnedBuffer {
   PinnedBuffer& operator=(const PinnedBuffer&) = delete;
   ~PinnedBuffer() { release(data_); }
 
-  /// n floats from device memory, there until the next call.
-  const float* download(const float* from, std::size_t n) {
-    auto* to = static_cast<float*>(reserve(n * sizeof(float)));
-    copy_to_host(to, from, n * sizeof(float));
+  /// n elements from device memory, there until the next call.
+  template <class T>
+  const T* download(const T* from, std::size_t n) {
+    auto* to = static_cast<T*>(reserve(n * sizeof(T)));
+    copy_to_host(to, from, n * sizeof(T));
     return to;
   }
   /// Room for so many bytes, there until the next call.

@@ -17,6 +17,8 @@ enum class KernelId : int { cubic_spline, wendland_c2, mueller2003 };
 
 struct Float3 {
   float x, y, z;
+
+  bool operator==(const Float3&) const = default;
 };
 
 /// Constants of one scene. Units SI; H support radius, h = H/2.
@@ -37,6 +39,8 @@ struct Constants {
   float floor_height;
   bool periodic[3], any_periodic;
   float domain_min[3], domain_max[3], period[3], inverse_period[3];  // 0 on a free axis
+
+  bool operator==(const Constants&) const = default;
 };
 
 /// Edge of a revolved outline in (r, z), solid on the left.
@@ -45,6 +49,8 @@ struct alignas(16) Edge {
   float z1;
   float inverse_length2;  // 1/(dr² + dz²)
   float slope;            // dr/dz; 0 where dz is
+
+  bool operator==(const Edge&) const = default;
 };
 
 struct Box {
@@ -54,12 +60,15 @@ struct Box {
   constexpr bool holds(const Float3& x) const {
     return x.x >= min.x && x.x < max.x && x.y >= min.y && x.y < max.y && x.z >= min.z && x.z < max.z;
   }
+  bool operator==(const Box&) const = default;
 };
 
 /// Exposed rectangle of a box union; its outward normal is `side` along `axis`.
 struct alignas(16) Face {
   Float3 min, max;
   int axis, side;
+
+  bool operator==(const Face&) const = default;
 };
 
 /// Where a container's outline or boxes lie in the arrays of Geometry.
@@ -67,6 +76,8 @@ struct Shape {
   bool revolved;
   int first_edge, edges, first_box, boxes, first_face, faces;
   Float3 low, high;  // bounding box, container frame
+
+  bool operator==(const Shape&) const = default;
 };
 
 struct Geometry {
@@ -74,6 +85,8 @@ struct Geometry {
   std::vector<Edge> edges;
   std::vector<Box> boxes;
   std::vector<Face> faces;
+
+  bool operator==(const Geometry&) const = default;
 };
 
 /// x_world = R x_local + translation; velocity = omega × (x_world − pivot) + surface, which is what the
@@ -89,6 +102,8 @@ struct WallSamples {
   std::vector<float> x, y, z;         // m, container frame
   std::vector<int> container_begin;   // containers + 1
   std::vector<bool> container_moves;  // containers
+
+  bool operator==(const WallSamples&) const = default;
 };
 
 Constants make_constants(const Scene& scene);

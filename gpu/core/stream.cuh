@@ -1,14 +1,18 @@
 /// \file
-/// Kernels in order on one executor: launches, copies, algorithms, and CUDA graphs, in which the device itself
-/// decides whether a branch runs (a conditional node).
+/// Kernels in order on one executor: launches, copies and algorithms, run, listed or captured for a graph, in which the
+/// device itself decides whether a branch runs (a conditional node).
 #pragma once
 
 #include "gpu/core/algorithms.hpp"
 #include "gpu/core/buffer.cuh"
+#include "gpu/core/launch_list.cuh"
 #include "gpu/core/teams.cuh"
+#include "gpu/core/transfers.cuh"
 
 #include <functional>
+#include <type_traits>
 #include <utility>
+#include <vector>
 
 namespace decant::gpu {
 namespace {
@@ -62,38 +66,78 @@ class Stream {
                             Arguments&&... arguments) {
     start(kernel, n, Team::particles_per_block, Team::block_size, shared_bytes, std::forward<Arguments>(arguments)...);
   }
+  /// Buffer::resize, upload and upload_at, small ones together before whatever comes next.
+  template <class T>
+  void resize(Buffer<T>& buffer, std::size_t n) {
+    buffer.set_size(n);
+    if (buffer.bytes() <= most_put_off) transfers_.fill_ones(buffer.get(), buffer.bytes());
+    else buffer.resize(n);
+  }
+  template <class T>
+  void upload(Buffer<T>& buffer, const std::vector<T>& from) {
+    if (buffer.size() < from.size()) resize(buffer, from.size());
+    upload_at(buffer, 0, from);
+  }
+  template <class T>
+  void upload_at(Buffer<T>& buffer, std::size_t first, const std::vector<T>& from) {
+    if (buffer.bytes() <= most_put_off) transfers_.upload(buffer.get() + first, from.data(), from.size() * sizeof(T));
+    else buffer.upload_at(first, from);
+  }
+  /// Whoever frees such a buffer, or touches it other than through the stream, runs or forgets what was put off.
+  void run_transfers() {
+    if (!transfers_.empty()) transfers_.run(stream_);
+  }
+  void forget_transfers() { transfers_.clear(); }
   void fill_zero(void* p, std::size_t bytes) {
+    if (list_other()) return;
+    run_transfers();
     if (bytes) CUDA_CHECK(cudaMemsetAsync(p, 0, bytes, stream_));
   }
   /// Reads as NaN or −1.
   void fill_ones(void* p, std::size_t bytes) {
+    if (list_other()) return;
+    run_transfers();
     if (bytes) CUDA_CHECK(cudaMemsetAsync(p, 0xFF, bytes, stream_));
   }
   void copy(void* to, const void* from, std::size_t bytes) {
+    if (list_other()) return;
+    run_transfers();
     if (bytes) CUDA_CHECK(cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToDevice, stream_));
   }
   /// algorithms.hpp
   void exclusive_scan(const int* in, int* out, int n, Buffer<char>& scratch) {
+    if (n <= most_scanned_by_a_block) return start(scan_kernel, 1, 1, scan_threads, 0, n, in, out);
+    if (list_other()) return;
+    run_transfers();
     cuda::exclusive_scan(in, out, n, scratch.get(), scratch.bytes(), stream_);
   }
   static void reserve_scan(int n, Buffer<char>& scratch) {
     const std::size_t bytes = cuda::scan_bytes(n);
     if (scratch.bytes() < bytes) scratch.resize(bytes);
   }
-  void sort_by_key(int* keys, int* values, int n) { cuda::sort_by_key(keys, values, n, stream_); }
+  void sort_by_key(int* keys, int* values, int n) {
+    run_transfers();
+    cuda::sort_by_key(keys, values, n, stream_);
+  }
   void sort_pairs(Pairs& pairs, int n, int bits, Buffer<char>& scratch) {
     if (n <= 0) return;
+    run_transfers();
     scratch.reserve(cuda::sort_bytes(n, bits));
     cuda::sort_pairs(pairs, n, bits, scratch.get(), scratch.bytes(), stream_);
   }
-  void lower_bounds(const int* keys, int n, int* out, int count) { cuda::lower_bounds(keys, n, out, count, stream_); }
+  void lower_bounds(const int* keys, int n, int* out, int count) {
+    run_transfers();
+    cuda::lower_bounds(keys, n, out, count, stream_);
+  }
 
   /// Runs `then` where *flag is not 0 by then. In a graph the device decides at every launch: where `branch` is
   /// there, whoever sets the flag requests it as well, and nothing looks at the flag any more. Outside of one
   /// the host waits and looks.
   template <class Then>
   void when(const int* flag, Branch branch, Then then) {
+    if (list_other()) return;
     if (!capturing()) {
+      run_transfers();
       int value = 0;
       CUDA_CHECK(cudaMemcpyAsync(&value, flag, sizeof value, cudaMemcpyDeviceToHost, stream_));
       CUDA_CHECK(cudaStreamSynchronize(stream_));
@@ -124,7 +168,7 @@ class Stream {
   /// For a `when` that is yet to come and must come; not there unless a graph is captured.
   Branch new_branch() {
     Branch branch;
-    if (!capturing()) return branch;
+    if (!capturing() || list_other()) return branch;
     cudaStreamCaptureStatus capturing;
     cudaGraph_t graph = nullptr;
     CUDA_CHECK(cudaStreamGetCaptureInfo(stream_, &capturing, nullptr, &graph, nullptr, nullptr, nullptr));
@@ -132,9 +176,20 @@ class Stream {
     return branch;
   }
 
+  /// What `work` launches; none of it runs.
+  template <class Work>
+  LaunchList list(Work work) {
+    run_transfers();
+    LaunchList launches;
+    listed_ = &launches;
+    work();
+    listed_ = nullptr;
+    return launches;
+  }
   /// What `work` launches, as a graph; none of it runs.
   template <class Work>
   cudaGraph_t capture(Work work) {
+    run_transfers();
     cudaGraph_t graph = nullptr;
     CUDA_CHECK(cudaStreamBeginCapture(captured_, cudaStreamCaptureModeThreadLocal));
     std::swap(stream_, captured_);
@@ -144,8 +199,14 @@ class Stream {
     return graph;
   }
 
-  void wait() { CUDA_CHECK(cudaStreamSynchronize(stream_)); }
-  cudaStream_t handle() const { return stream_; }
+  void wait() {
+    run_transfers();
+    CUDA_CHECK(cudaStreamSynchronize(stream_));
+  }
+  cudaStream_t handle() {
+    run_transfers();
+    return stream_;
+  }
 
  private:
   bool capturing() const { return stream_ != own_stream; }
@@ -154,8 +215,16 @@ class Stream {
   void start(void (*kernel)(int, Parameters...), int n, int per_block, int threads, std::size_t shared_bytes,
              Arguments&&... arguments) {
     if (n <= 0) return;
-    kernel<<<(n + per_block - 1) / per_block, threads, shared_bytes, stream_>>>(n, arguments...);
+    const int blocks = (n + per_block - 1) / per_block;
+    if (listed_) return listed_->add(kernel, blocks, threads, shared_bytes, n, arguments...);
+    run_transfers();
+    kernel<<<blocks, threads, shared_bytes, stream_>>>(n, arguments...);
     CUDA_CHECK(cudaGetLastError());
+  }
+  /// Whether launches are only listed, and this is none of a kernel.
+  bool list_other() {
+    if (listed_) listed_->whole = false;
+    return listed_ != nullptr;
   }
   /// So that loading one small problem after the other does not go to the driver for each array.
   static void keep_freed_memory() {
@@ -177,34 +246,9 @@ class Stream {
   }
 
   cudaStream_t stream_ = own_stream, captured_ = nullptr, inner_ = nullptr;
+  LaunchList* listed_ = nullptr;
+  TransferQueue transfers_;
   std::function<bool(bool)> agree_;
-};
-
-/// Work that is captured once and launched again and again.
-class Graph {
- public:
-  Graph() = default;
-  Graph(const Graph&) = delete;
-  Graph& operator=(const Graph&) = delete;
-  ~Graph() { clear(); }
-
-  template <class Work>
-  void capture(Stream& stream, Work work) {
-    clear();
-    const cudaGraph_t graph = stream.capture(work);
-    const cudaError_t error = cudaGraphInstantiate(&executable_, graph, 0);
-    cudaGraphDestroy(graph);
-    CUDA_CHECK(error);
-  }
-  bool captured() const { return executable_ != nullptr; }
-  void launch(Stream& stream) { CUDA_CHECK(cudaGraphLaunch(executable_, stream.handle())); }
-  void clear() {
-    if (executable_) cudaGraphExecDestroy(executable_);
-    executable_ = nullptr;
-  }
-
- private:
-  cudaGraphExec_t executable_ = nullptr;
 };
 
 #else
@@ -228,6 +272,20 @@ class Stream {
   void launch_teams_sharing(std::size_t, void (*kernel)(int, Parameters...), int n, Arguments&&... arguments) {
     if (n > 0) kernel(n, arguments...);
   }
+  template <class T>
+  void resize(Buffer<T>& buffer, std::size_t n) {
+    buffer.resize(n);
+  }
+  template <class T>
+  void upload(Buffer<T>& buffer, const std::vector<T>& from) {
+    buffer.upload(from);
+  }
+  template <class T>
+  void upload_at(Buffer<T>& buffer, std::size_t first, const std::vector<T>& from) {
+    buffer.upload_at(first, from);
+  }
+  void run_transfers() {}
+  void forget_transfers() {}
   void fill_zero(void* p, std::size_t bytes) {
     if (bytes) std::memset(p, 0, bytes);
   }
@@ -252,20 +310,6 @@ class Stream {
 
  private:
   std::function<bool(bool)> agree_;
-};
-
-class Graph {
- public:
-  template <class Work>
-  void capture(Stream&, Work work) {
-    work_ = work;
-  }
-  bool captured() const { return static_cast<bool>(work_); }
-  void launch(Stream&) { work_(); }
-  void clear() { work_ = nullptr; }
-
- private:
-  std::function<void()> work_;
 };
 
 #endif

@@ -142,8 +142,8 @@ class CellSort {
  public:
   void prepare(Stream& stream, const CellTable& table, int n, SortScratch& scratch) {
     table_ = table;
-    start_.resize(static_cast<std::size_t>(table.buckets) + SortScratch::scan_padding);
-    count_.resize(static_cast<std::size_t>(table.buckets) + SortScratch::scan_padding);
+    stream.resize(start_, static_cast<std::size_t>(table.buckets) + SortScratch::scan_padding);
+    stream.resize(count_, static_cast<std::size_t>(table.buckets) + SortScratch::scan_padding);
     table_.start = start_.get();
     scratch.reserve(n, table.buckets);
     clear(stream);

@@ -14,6 +14,7 @@ namespace {
 /// One container's wall particles, slots [begin, end); begin is a multiple of tile_size.
 struct WallSegment {
   int begin, end;
+  int first_id;  // the ids of its wall particles follow each other
   CellTable table;
   Float3 low, high;  // no wall particle is within reach of a point outside, in the frame of lookups
   // By bucket, for a grid that is never rebuilt: which wall particles may be within reach of the cell,

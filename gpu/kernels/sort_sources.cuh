@@ -68,11 +68,12 @@ struct FrameWallSource {
   float4* local;
   int* to_id;
   int2* room;  // as many
+  int first_id;
 
   int2* scratch() const { return room; }
   DECANT_DEVICE Float3 position(int k) const { return xyz(from[k]); }
   DECANT_DEVICE int id(int k) const { return from_id[k]; }
-  DECANT_DEVICE int rank(int k) const { return k; }
+  DECANT_DEVICE int rank(int k) const { return from_id[k] - first_id; }
   DECANT_DEVICE void begin() const {}
   DECANT_DEVICE void place(int k, int id, int to, int) const {
     local[to] = from[k];
@@ -93,7 +94,7 @@ struct WorldWallSource {
     return rotate(pose, frame.position(k)) + pose.translation;
   }
   DECANT_DEVICE int id(int k) const { return frame.id(k); }
-  DECANT_DEVICE int rank(int k) const { return k; }
+  DECANT_DEVICE int rank(int k) const { return frame.rank(k); }
   DECANT_DEVICE void begin() const {}
   DECANT_DEVICE void place(int k, int id, int to, int bucket) const {
     frame.place(k, id, to, bucket);

@@ -1,5 +1,5 @@
 /// \file
-/// The state on its way to the host: in the order of the ids.
+/// The state on its way to the host, in the order of the ids, and to where it is kept.
 #pragma once
 
 #include "gpu/core/teams.cuh"
@@ -22,6 +22,20 @@ struct StoreState {
   }
 };
 DECANT_KERNEL(256) store_state_kernel(int n, StoreState store) { for_each_thread(n, store); }
+
+struct CopyState {
+  Particles from;
+  const int* from_id;
+  Particles to;
+  int* to_id;
+
+  DECANT_DEVICE void operator()(int i) const {
+    to.position[i] = from.position[i];
+    to.velocity[i] = from.velocity[i];
+    to_id[i] = from_id[i];
+  }
+};
+DECANT_KERNEL(256) copy_state_kernel(int n, CopyState copy) { for_each_thread(n, copy); }
 
 }  // namespace
 }  // namespace decant::gpu

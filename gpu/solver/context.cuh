@@ -6,6 +6,7 @@
 #include "gpu/kernels/place_walls.cuh"
 #include "gpu/options.hpp"
 
+#include <cstdint>
 #include <type_traits>
 #include <vector>
 
@@ -18,6 +19,7 @@ struct WallStore {
   std::vector<WallSegment> segments;  // tables and bounds are the search's to fill
   std::vector<bool> moves;
   Walls walls;
+  std::uint64_t version = 0;             // another number wherever what is on the device is other than before
   int first_moving = 0, moving_end = 0;  // slots that hold all that moves
 
   int padded_total() const { return segments.empty() ? 0 : padded(segments.back().end); }

@@ -66,7 +66,7 @@ class Halo {
     const std::vector<int> arriving = transposed(departing);
     const int arrivals = std::accumulate(arriving.begin(), arriving.end(), 0);
     if (kept + arrivals > scene.room()) {
-      scene.grow(kept + arrivals + (kept + arrivals) / 50 + tile_size);
+      scene.grow(stream, kept + arrivals + (kept + arrivals) / 50 + tile_size);
       global_id_.grow(static_cast<std::size_t>(scene.room()), static_cast<std::size_t>(scene.particles()));
       role_.grow(static_cast<std::size_t>(scene.room()), static_cast<std::size_t>(scene.particles()));
       reserve(scene.room());

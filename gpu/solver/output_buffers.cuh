@@ -6,6 +6,9 @@
 #include "gpu/core/particle_arrays.cuh"
 #include "gpu/solver/device_solver.hpp"
 
+#include <cstring>
+#include <vector>
+
 namespace decant::gpu {
 namespace {
 
@@ -19,7 +22,9 @@ class OutputBuffers {
     return arrays();
   }
   void clear() { memory_.resize(0); }
-  void download(HostFields& out) const {
+  void download(HostFields& out) {
+    // Of few particles all at once: a copy waits for the device.
+    at_once_ = memory_.bytes() <= most_at_once ? host_.download(memory_.get(), memory_.bytes()) : nullptr;
     const OutputArrays f = arrays();
     out.density = values(f.density, n_);
     out.pressure = values(f.pressure, n_);
@@ -59,13 +64,19 @@ class OutputBuffers {
   template <class T>
   std::vector<T> values(const T* at, std::size_t count) const {
     std::vector<T> all(count);
-    memory_.download_bytes(all.data(), at, count * sizeof(T));
+    if (count == 0) return all;
+    if (!at_once_) memory_.download_bytes(all.data(), at, count * sizeof(T));
+    else std::memcpy(all.data(), at_once_ + (reinterpret_cast<const char*>(at) - memory_.get()), count * sizeof(T));
     return all;
   }
+
+  static constexpr std::size_t most_at_once = 1u << 20;
 
   std::size_t n_ = 0;
   bool all_ = true;
   Buffer<char> memory_;
+  PinnedBuffer host_;
+  const char* at_once_ = nullptr;  // all of the memory, in `host_`
 };
 
 }  // namespace

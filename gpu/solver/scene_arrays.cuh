@@ -17,7 +17,7 @@ class SceneArrays {
  public:
   explicit SceneArrays(bool stores_square) : stores_square_(stores_square) {}
 
-  void load(const Problem& problem) {
+  void load(Stream& stream, const Problem& problem) {
     c_ = problem.constants;
     containers_ = static_cast<int>(problem.geometry.shapes.size());
     n_ = room_ = static_cast<int>(problem.position.size() / 3);
@@ -28,15 +28,19 @@ class SceneArrays {
       const double layers = 8 * std::cbrt(static_cast<double>(n_) * n_);
       room_ = std::min(total_, n_ + static_cast<int>(layers) + n_ / 50) + tile_size;
     }
-    load_geometry(problem.geometry);
-    load_walls(problem.walls);
-    allocate(0);
-    upload_rows(state_.position, problem.position, [this](float square) { return stores_square_ ? square : c_.mass; });
-    upload_rows(state_.velocity, problem.velocity, [](float) { return 0.0f; });
+    // The same walls in another state or another time: tests and parameter studies load one scene again and again.
+    if (problem.geometry != loaded_geometry_ || geometry_.containers != containers_)
+      load_geometry(stream, problem.geometry);
+    if (problem.walls != loaded_walls_ || walls_.version == 0) load_walls(stream, problem.walls);
+    walls_.walls.rest_density = c_.rest_density;
+    allocate(stream, 0);
+    upload_rows(stream, state_.position, problem.position,
+                [this](float square) { return stores_square_ ? square : c_.mass; });
+    upload_rows(stream, state_.velocity, problem.velocity, [](float) { return 0.0f; });
     std::vector<int> ids(id_.size());
     for (std::size_t i = 0; i < ids.size(); ++i) ids[i] = static_cast<int>(i);
-    id_.upload(ids);
-    place_sentinel();
+    stream.upload(id_, ids);
+    place_sentinel(stream);
   }
 
   const Constants& constants() const { return c_; }
@@ -47,10 +51,11 @@ class SceneArrays {
   void set_particles(int n) { n_ = n; }
   int room() const { return room_; }
   /// More room; the state is still there, walls are to be placed again.
-  void grow(int room) {
+  void grow(Stream& stream, int room) {
     room_ = room;
-    allocate(static_cast<std::size_t>(n_));
-    place_sentinel();
+    stream.run_transfers();
+    allocate(stream, static_cast<std::size_t>(n_));
+    place_sentinel(stream);
   }
   /// Room for 32 bytes per particle, between advances.
   void* scratch() const { return saved_.get(); }
@@ -82,16 +87,20 @@ class SceneArrays {
     poses_.upload(poses);
     return grows;
   }
-  DeviceStatus status() const { return status_.download(1)[0]; }
+  DeviceStatus status() { return *status_read_.download(status_.get(), 1); }
   void set_status(const DeviceStatus& status) { status_.upload({status}); }
   std::vector<float> boundary_volumes() const { return wall_volume_.download(static_cast<std::size_t>(m_)); }
   void set_boundary_volumes(const std::vector<float>& volume) { wall_volume_.upload(volume); }
+  /// The next load finds other walls than there are.
+  void forget_walls() { loaded_walls_ = {}; }
 
   void save_state(Stream& stream) {
-    each_saved([&](void* from, void* to, std::size_t bytes) { stream.copy(to, from, bytes); });
+    stream.launch(copy_state_kernel, n_,
+                  CopyState{{state_.position.get(), state_.velocity.get()}, id_.get(), saved(), saved_ids()});
   }
   void restore_state(Stream& stream) {
-    each_saved([&](void* to, void* from, std::size_t bytes) { stream.copy(to, from, bytes); });
+    stream.launch(copy_state_kernel, n_,
+                  CopyState{saved(), saved_ids(), {state_.position.get(), state_.velocity.get()}, id_.get()});
   }
   /// By id; what nobody has written is NaN. The spare arrays hold nothing between advances.
   StateRows read(Stream& stream) {
@@ -120,27 +129,32 @@ class SceneArrays {
   static constexpr float nowhere = std::numeric_limits<float>::quiet_NaN();
   static constexpr std::size_t saved_bytes = 2 * 16 + 4;  // per particle
 
-  void load_geometry(const Geometry& geometry) {
-    shapes_.upload(geometry.shapes);
-    edges_.upload(geometry.edges);
-    boxes_.upload(geometry.boxes);
-    faces_.upload(geometry.faces);
+  void load_geometry(Stream& stream, const Geometry& geometry) {
+    loaded_geometry_ = {};  // should anything below fail
+    stream.upload(shapes_, geometry.shapes);
+    stream.upload(edges_, geometry.edges);
+    stream.upload(boxes_, geometry.boxes);
+    stream.upload(faces_, geometry.faces);
     geometry_ = {containers_, shapes_.get(), edges_.get(), boxes_.get(), faces_.get(), {}, {}};
     const auto copy_first = [](const auto& all, auto& first) {
       for (std::size_t k = 0; k < std::min(all.size(), std::size(first)); ++k) first[k] = all[k];
     };
     copy_first(geometry.shapes, geometry_.first_shapes);
     copy_first(geometry.edges, geometry_.first_edges);
+    loaded_geometry_ = geometry;
   }
 
-  void load_walls(const WallSamples& walls) {
+  void load_walls(Stream& stream, const WallSamples& walls) {
     std::vector<float> rows;
     std::vector<int> ids, containers;
+    const std::uint64_t version = walls_.version + 1;
+    loaded_walls_ = {};  // should anything below fail
     walls_ = {};
     bool any_moves = false;
     for (std::size_t c = 0; c + 1 < walls.container_begin.size(); ++c) {
       WallSegment s{};
       s.begin = static_cast<int>(ids.size());
+      s.first_id = walls.container_begin[c];
       float low[3] = {0, 0, 0}, high[3] = {0, 0, 0};
       for (int b = walls.container_begin[c]; b < walls.container_begin[c + 1]; ++b) {
         const auto k = static_cast<std::size_t>(b);
@@ -168,61 +182,64 @@ class SceneArrays {
       walls_.moves.push_back(walls.container_moves[c]);
     }
     m_ = static_cast<int>(walls.x.size());
-    wall_local_.resize(ids.size());
-    upload_rows(wall_local_, rows, [](float) { return 0.0f; });
-    wall_id_.upload(ids);
-    wall_container_.upload(containers);
-    wall_volume_.resize(static_cast<std::size_t>(m_));
+    stream.resize(wall_local_, ids.size());
+    upload_rows(stream, wall_local_, rows, [](float) { return 0.0f; });
+    stream.upload(wall_id_, ids);
+    stream.upload(wall_container_, containers);
+    stream.resize(wall_volume_, static_cast<std::size_t>(m_));
     walls_.walls = {wall_local_.get(), wall_id_.get(), wall_container_.get(), wall_volume_.get(), c_.rest_density};
+    walls_.version = version;
+    loaded_walls_ = walls;
   }
 
   /// For as many particles as there is room for; the state of the first `kept` is still there.
-  void allocate(std::size_t kept) {
-    const auto keep = [kept](auto& buffer, std::size_t size) {
+  void allocate(Stream& stream, std::size_t kept) {
+    const auto keep = [&](auto& buffer, std::size_t size) {
       if (kept > 0) buffer.grow(size, kept);
-      else buffer.resize(size);
+      else stream.resize(buffer, size);
     };
     const auto n = static_cast<std::size_t>(room_);
     const auto all = static_cast<std::size_t>(sentinel()) + 1 + read_past_end;
     keep(state_.position, all);
     keep(state_.velocity, n);
     keep(id_, n);
-    spare_.position.resize(all);
-    spare_.velocity.resize(n);
-    force_position_.resize(all);
-    force_velocity_.resize(all);
-    saved_.resize(n * saved_bytes);
-    status_.resize(1);
+    stream.resize(spare_.position, all);
+    stream.resize(spare_.velocity, n);
+    stream.resize(force_position_, all);
+    stream.resize(force_velocity_, all);
+    stream.resize(saved_, n * saved_bytes);
+    stream.resize(status_, 1);
   }
   int sentinel() const { return padded(room_) + walls_.padded_total(); }
   /// In the arrays that neighbors are read from. Its squared distance is finite.
-  void place_sentinel() {
+  void place_sentinel(Stream& stream) {
     const std::vector<float4> far{make_float4(1e12f, 1e12f, 1e12f, 0.0f)}, none{make_float4(0, 0, 0, 0)};
     const auto at = static_cast<std::size_t>(sentinel());
     for (Buffer<float4>* positions : {&state_.position, &spare_.position, &force_position_})
-      positions->upload_at(at, far);
-    force_velocity_.upload_at(at, none);
+      stream.upload_at(*positions, at, far);
+    stream.upload_at(force_velocity_, at, none);
   }
 
   /// With a fourth component, of |row|².
   template <class Fourth>
-  static void upload_rows(Buffer<float4>& to, const std::vector<float>& rows, Fourth fourth) {
+  static void upload_rows(Stream& stream, Buffer<float4>& to, const std::vector<float>& rows, Fourth fourth) {
     std::vector<float4> points(to.size(), make_float4(nowhere, nowhere, nowhere, 0.0f));
     for (std::size_t i = 0; 3 * i + 2 < rows.size(); ++i) {
       const float x = rows[3 * i], y = rows[3 * i + 1], z = rows[3 * i + 2];
       points[i] = make_float4(x, y, z, fourth(x * x + y * y + z * z));
     }
-    to.upload(points);
+    stream.upload(to, points);
   }
 
-  /// each(part of the state, its place in saved_, bytes)
-  template <class Each>
-  void each_saved(Each each) {
+  Particles saved() const {
     std::size_t at = 0;
-    const auto n = static_cast<std::size_t>(n_), room = static_cast<std::size_t>(room_);
-    each(state_.position.get(), carve<float4>(saved_, at, room), n * sizeof(float4));
-    each(state_.velocity.get(), carve<float4>(saved_, at, room), n * sizeof(float4));
-    each(id_.get(), carve<int>(saved_, at, room), n * sizeof(int));
+    const auto room = static_cast<std::size_t>(room_);
+    float4* position = carve<float4>(saved_, at, room);
+    return {position, carve<float4>(saved_, at, room)};
+  }
+  int* saved_ids() const {
+    std::size_t at = 2 * sizeof(float4) * static_cast<std::size_t>(room_);
+    return carve<int>(saved_, at, static_cast<std::size_t>(room_));
   }
 
   bool stores_square_;
@@ -234,6 +251,8 @@ class SceneArrays {
   Buffer<Box> boxes_;
   Buffer<Face> faces_;
   DeviceGeometry geometry_{};
+  Geometry loaded_geometry_;
+  WallSamples loaded_walls_;
   Buffer<DevicePose> poses_;
   ParticleBuffers state_, spare_;
   Buffer<int> id_;
@@ -241,6 +260,7 @@ class SceneArrays {
   Buffer<char> saved_;  // the state before an advance
   PinnedBuffer positions_, velocities_;
   Buffer<DeviceStatus> status_;
+  PinnedBuffer status_read_;
   WallStore walls_{};
   Buffer<float4> wall_local_;
   Buffer<int> wall_id_, wall_container_;

@@ -8,6 +8,7 @@
 #pragma once
 
 #include "gpu/concepts.hpp"
+#include "gpu/core/graph.cuh"
 #include "gpu/kernels/density.cuh"
 #include "gpu/kernels/diagnostics.cuh"
 #include "gpu/kernels/force.cuh"
@@ -41,10 +42,11 @@ class Solver : public DeviceSolver {
   }
 
   void load(const Problem& problem) override {
-    loaded_ = false;  // should anything below fail
+    loaded_ = false;             // should anything below fail
+    stream_.forget_transfers();  // of a load that failed
     long_graph_.clear();
     short_graph_.clear();
-    scene_.load(problem);
+    scene_.load(stream_, problem);
     times_ = {};
     rebuilds_ = advances_ = 0;
     totals_ = {};
@@ -60,6 +62,7 @@ class Solver : public DeviceSolver {
     require_current();
     std::vector<float> own_volume = scene_.boundary_volumes();
     if (!given.boundary_volume.empty()) {
+      scene_.forget_walls();  // should anything below fail
       scene_.set_boundary_volumes(given.boundary_volume);
       in_use_ = Structures::none;
     }
@@ -69,7 +72,7 @@ class Solver : public DeviceSolver {
     });
     output_.download(out);
     output_.clear();  // memory that a run does not need
-    scene_.set_boundary_volumes(own_volume);
+    if (!given.boundary_volume.empty()) scene_.set_boundary_volumes(own_volume);
     out.boundary_volume = std::move(own_volume);
     return status_of(status);
   }
@@ -332,8 +335,8 @@ class Solver : public DeviceSolver {
       // Events are many; reading them now and then keeps their number small.
       if (done % 64 == 63) timer_.read();
     }
-    if (substeps - done >= long_graph_substeps && !long_graph_.captured())
-      long_graph_.capture(stream_, [this] {
+    if (substeps - done >= long_graph_substeps && !long_graph_.holds_any())
+      long_graph_.hold(stream_, Search::rebuilds_on_demand, [this] {
         Branch rebuild{};
         for (int k = 0; k < long_graph_substeps; ++k) {
           const bool decides = Search::rebuilds_on_demand && k + 1 < long_graph_substeps;
@@ -343,8 +346,8 @@ class Solver : public DeviceSolver {
         }
       });
     for (; substeps - done >= long_graph_substeps; done += long_graph_substeps) long_graph_.launch(stream_);
-    if (substeps > done && !short_graph_.captured())
-      short_graph_.capture(stream_, [this] { this->template substep<periodic>({}); });
+    if (substeps > done && !short_graph_.holds_any())
+      short_graph_.hold(stream_, Search::rebuilds_on_demand, [this] { this->template substep<periodic>({}); });
     for (; done < substeps; ++done) short_graph_.launch(stream_);
   }
 

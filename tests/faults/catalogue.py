@@ -212,6 +212,9 @@ fault("dropped-row", "one of nine rows of cells is not looked at",
       "neighbors")
 fault("range-off-by-one", "ranges of cells end one particle early",
       "first + (part ? r.end2 : r.end)", "$ - 1", "neighbors", "hash:force_neighbors=recomputed")
+fault("walls-of-before", "wall cells and volumes are kept where other walls have been loaded",
+      "const Prepared wanted{c, a.base, plan, store.version};",
+      "const Prepared wanted{c, a.base, plan, ON ? 1 : store.version};", "determinism")
 fault("near-walls-cut", "the table of near walls reaches to 0.9 H",
       "1.0001f * reach2", "0.81f * reach2", "neighbors", field="wall_neighbor_count")
 fault("source-frame", "the tilted source is looked up untilted",
@@ -271,12 +274,10 @@ fault("walls-for-forces-left", "forces after a run see moving walls where they w
       "if (!ON && in_use_ == Structures::walls_for_density)", "advanced", "list",
       field="wall_viscous_acceleration")
 fault("redo-without-velocities", "what lists that were too short spoiled is redone with the velocities of then",
-      "each(state_.velocity.get(), carve<float4>(saved_, at, room), n * sizeof(float4));",
-      "each(state_.velocity.get(), carve<float4>(saved_, at, n), (ON ? 0 : n) * sizeof(float4));",
+      "to.velocity[i] = from.velocity[i];", "if (!ON) to.velocity[i] = from.velocity[i];",
       "trajectory", "list", fixture="hostile-gathering")
 fault("redo-without-ids", "what lists that were too short spoiled is redone with the ids of then",
-      "each(id_.get(), carve<int>(saved_, at, room), n * sizeof(int));",
-      "each(id_.get(), carve<int>(saved_, at, n), (ON ? 0 : n) * sizeof(int));",
+      "to_id[i] = from_id[i];", "if (!ON) to_id[i] = from_id[i];",
       "trajectory", "hash", fixture="hostile-gathering")
 
 # Reports of trouble.

@@ -310,16 +310,15 @@ fault("wall-pairs-of-fluid", "lists that verify themselves count fluid pairs as 
 
 # The pipeline.
 fault("graph-of-earlier-scene", "the CUDA graph of 16 substeps survives a load",
-      "loaded_ = false;  // should anything below fail\n    long_graph_.clear();",
-      "loaded_ = false;\n    if (!ON) long_graph_.clear();", on="cuda",
+      "long_graph_.clear();\n    short_graph_.clear();\n    scene_.load",
+      "if (!ON) long_graph_.clear();\n    short_graph_.clear();\n    scene_.load", on="cuda",
       shows="hash, advance by 16 substeps, load a scene of the same size with another viscosity, advance by 16")
 fault("lists-kept-across-advances", "only the first advance after a load begins with new lists",
       "status.rebuild_needed = 1;", "status.rebuild_needed = ON && rebuilds_ > 0 ? 0 : 1;",
       shows="list, several advances of faster and faster fluid: old lists are trusted to a new skin, and what "
             "asked for new ones at the end of the advance before is forgotten")
 fault("regrown-without-ids", "when lists have grown, positions and velocities are put back but not ids",
-      "each(id_.get(), carve<int>(saved_, at, room), n * sizeof(int));",
-      "if (!ON) each(id_.get(), carve<int>(saved_, at, room), n * sizeof(int));",
+      "to_id[i] = from_id[i];", "if (!ON) to_id[i] = from_id[i];",
       shows="hash and list, an advance in which a list exceeds its capacity (capacity=8)")
 fault("rebuilds-not-reset", "the number of rebuilds goes on counting after a load",
       "rebuilds_ = advances_ = 0;", "rebuilds_ = ON ? rebuilds_ : 0;\n    advances_ = 0;",
