@@ -157,17 +157,18 @@ PreparedReference prepare_reference(const Fixture& fixture, const CheckSelection
   prepared.walls = sample_walls(scene);
   prepared.volumes = wall_solution(scene, prepared.walls);
   const WallSolution& volumes = prepared.volumes;
-  prepared.own = reference_solution(scene, prepared.walls, volumes, fixture.state);
+  ReferenceAt reference(scene, prepared.walls, volumes, fixture.state);
+  prepared.own = reference.solution();
   require_reproduced(fixture, prepared.own);
   prepared.inputs = stage_inputs(scene, prepared.own.fields, staged);
   const auto wanted = [&](std::initializer_list<const char*> names) {
     return std::any_of(names.begin(), names.end(), [&](const char* name) { return checks.count(name) > 0; });
   };
   if (wanted({"fields", "conservation"})) {
-    prepared.given = reference_solution(scene, prepared.walls, volumes, fixture.state, &prepared.inputs);
-    prepared.given_fp32 = fp32_reference_fields(scene, prepared.walls, volumes, fixture.state, &prepared.inputs);
+    prepared.given = reference.solution(&prepared.inputs);
+    prepared.given_fp32 = reference.fp32_fields(&prepared.inputs);
   }
-  if (wanted({"fields"})) prepared.own_fp32 = fp32_reference_fields(scene, prepared.walls, volumes, fixture.state);
+  if (wanted({"fields"})) prepared.own_fp32 = reference.fp32_fields();
   if (wanted({"substep"})) prepared.substep = substep_solution(scene, fixture.state, prepared.own);
   if (wanted({"contact"})) prepared.contact = contact_problems(scene, fixture.state, prepared.own.fields.acceleration);
   const bool runs = wanted({"trajectory", "mass", "containment", "determinism"});
@@ -185,8 +186,10 @@ PreparedReference prepare_reference(const Fixture& fixture, const CheckSelection
     for (Segment& segment : prepared.segments) segment.viewed = false;
   if (wanted({"invariance"}))
     for (TransformedProblem& problem : transformed_problems(scene, fixture.state)) {
-      Walls walls = sample_walls(problem.scene);
-      ReferenceSolution its_solution = reference_solution(problem.scene, walls, problem.state);
+      const bool same_scene = problem.name == "permuted";
+      Walls walls = same_scene ? prepared.walls : sample_walls(problem.scene);
+      ReferenceSolution its_solution = reference_solution(
+          problem.scene, walls, same_scene ? volumes : wall_solution(problem.scene, walls), problem.state);
       prepared.transformed.push_back({std::move(problem), std::move(walls), std::move(its_solution)});
     }
   return prepared;

@@ -54,13 +54,14 @@ Eigen::VectorXd volume_tolerances(const Scene& scene, const WallNeighbors& neigh
   return tolerance;
 }
 
-class Bounds {
+}  // namespace
+
+class ReferenceAt::Bounds {
  public:
-  Bounds(const Scene& scene, const Walls& walls, const WallSolution& volumes, const ParticleState& state,
-         const StageInputs* given)
+  Bounds(const Scene& scene, const Walls& walls, const WallSolution& volumes, const ParticleState& state)
       : scene_(scene),
+        volumes_(volumes),
         state_(state),
-        given_(given),
         H_(scene.support_radius()),
         periodic_(scene.domain.periodic[0] || scene.domain.periodic[1] || scene.domain.periodic[2]),
         kernel_(scene.kernel, H_),
@@ -68,21 +69,37 @@ class Bounds {
         posed_(pose_walls(scene, walls, scene.time_at(state.substep))),
         pose_(pose_errors(scene, walls, posed_, scene.time_at(state.substep), u)),
         common_(scene.kernel) {
-    ReferenceSolution& a = solution_;
     Neighbors near_H;
     find_neighbors_and_shell(scene, state.position, posed_.position, widest_margin(), near_, near_H);
-    evaluate<double>(scene, state, posed_, volumes.volume, near_, a.fields, given);
-    a.tolerance = Fields::unwritten(state.size(), walls.size());
+    ambiguous_pairs(near_H);
+  }
+
+  ReferenceSolution solution(const StageInputs* given) {
+    given_ = given;
+    ReferenceSolution& a = solution_ = {};
+    evaluate<double>(scene_, state_, posed_, volumes_.volume, near_, a.fields, given);
+    const auto n = static_cast<std::size_t>(state_.size());
+    a.tolerance = Fields::unwritten(state_.size(), volumes_.volume.size());
     for (auto* facts : {&a.tolerance.fluid_neighbor_count, &a.tolerance.fluid_neighbor_id_sum,
                         &a.tolerance.wall_neighbor_count, &a.tolerance.wall_neighbor_id_sum})
       facts->setZero();
-    a.tolerance.boundary_volume = volumes.tolerance;
-    ambiguous_pairs(near_H);
+    a.tolerance.boundary_volume = volumes_.tolerance;
+    a.fluid_ambiguous.resize(n);
+    a.wall_ambiguous.resize(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      a.fluid_ambiguous[i] = !edge_fluid_[i].empty();
+      a.wall_ambiguous[i] = !edge_wall_[i].empty();
+    }
     density_and_pressure();
     accelerations();
+    return std::move(solution_);
   }
 
-  ReferenceSolution take() { return std::move(solution_); }
+  Fields fp32_fields(const StageInputs* given) const {
+    Fields fields;
+    evaluate<float>(scene_, state_, posed_, volumes_.fp32_volume, near_, fields, given);
+    return fields;
+  }
 
  private:
   /// What the bounds of one particle are put together in; memory is kept from one to the next.
@@ -361,8 +378,6 @@ class Bounds {
     const auto n = static_cast<std::size_t>(state_.size());
     edge_fluid_.resize(n);
     edge_wall_.resize(n);
-    solution_.fluid_ambiguous.assign(n, false);
-    solution_.wall_ambiguous.assign(n, false);
     const bool exact = exact_distances();
     for_particles(state_.size(), [&](Eigen::Index particle, Scratch&) {
       const auto i = static_cast<std::size_t>(particle);
@@ -380,15 +395,12 @@ class Bounds {
         edge_wall_[i].push_back({b, std::min(r, H_) - off});
       }
     });
-    for (std::size_t i = 0; i < n; ++i) {
-      solution_.fluid_ambiguous[i] = !edge_fluid_[i].empty();
-      solution_.wall_ambiguous[i] = !edge_wall_[i].empty();
-    }
   }
 
   const Scene& scene_;
+  const WallSolution& volumes_;
   const ParticleState& state_;
-  const StageInputs* given_;
+  const StageInputs* given_ = nullptr;
   double H_;
   bool periodic_;
   Kernel<double> kernel_;
@@ -408,7 +420,12 @@ class Bounds {
   ReferenceSolution solution_;
 };
 
-}  // namespace
+ReferenceAt::ReferenceAt(const Scene& scene, const Walls& walls, const WallSolution& volumes,
+                         const ParticleState& state)
+    : bounds_(std::make_unique<Bounds>(scene, walls, volumes, state)) {}
+ReferenceAt::~ReferenceAt() = default;
+ReferenceSolution ReferenceAt::solution(const StageInputs* given) { return bounds_->solution(given); }
+Fields ReferenceAt::fp32_fields(const StageInputs* given) const { return bounds_->fp32_fields(given); }
 
 WallSolution wall_solution(const Scene& scene, const Walls& walls) {
   const WallNeighbors neighbors = find_wall_neighbors(scene, walls);
@@ -421,21 +438,11 @@ WallSolution wall_solution(const Scene& scene, const Walls& walls) {
 
 ReferenceSolution reference_solution(const Scene& scene, const Walls& walls, const WallSolution& volumes,
                                      const ParticleState& state, const StageInputs* given) {
-  return Bounds(scene, walls, volumes, state, given).take();
+  return ReferenceAt(scene, walls, volumes, state).solution(given);
 }
 
 ReferenceSolution reference_solution(const Scene& scene, const Walls& walls, const ParticleState& state) {
   return reference_solution(scene, walls, wall_solution(scene, walls), state);
-}
-
-Fields fp32_reference_fields(const Scene& scene, const Walls& walls, const WallSolution& volumes,
-                             const ParticleState& state, const StageInputs* given) {
-  const PosedWalls posed = pose_walls(scene, walls, scene.time_at(state.substep));
-  Neighbors near;
-  find_neighbors(scene, state.position, posed.position, NeighborSearch::cells, near);
-  Fields fields;
-  evaluate<float>(scene, state, posed, volumes.fp32_volume, near, fields, given);
-  return fields;
 }
 
 }  // namespace decant

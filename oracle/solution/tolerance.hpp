@@ -14,6 +14,7 @@
 #include "reference/scene.hpp"
 #include "reference/state.hpp"
 
+#include <memory>
 #include <vector>
 
 namespace decant {
@@ -61,8 +62,22 @@ ReferenceSolution reference_solution(const Scene& scene, const Walls& walls, con
                                      const ParticleState& state, const StageInputs* given = nullptr);
 ReferenceSolution reference_solution(const Scene& scene, const Walls& walls, const ParticleState& state);
 
-/// The oracle's own source in sequential fp32 on the same inputs: what plain single precision costs.
-Fields fp32_reference_fields(const Scene& scene, const Walls& walls, const WallSolution& volumes,
-                             const ParticleState& state, const StageInputs* given = nullptr);
+/// The reference at one state, whose neighbors and places of walls are found once. What it is made from outlives it.
+class ReferenceAt {
+ public:
+  ReferenceAt(const Scene& scene, const Walls& walls, const WallSolution& volumes, const ParticleState& state);
+  ~ReferenceAt();
+  ReferenceAt(const ReferenceAt&) = delete;
+  ReferenceAt& operator=(const ReferenceAt&) = delete;
+
+  /// As reference_solution has it.
+  ReferenceSolution solution(const StageInputs* given = nullptr);
+  /// The oracle's own source in sequential fp32 on the same inputs: what plain single precision costs.
+  Fields fp32_fields(const StageInputs* given = nullptr) const;
+
+ private:
+  class Bounds;
+  std::unique_ptr<Bounds> bounds_;
+};
 
 }  // namespace decant
