@@ -31,7 +31,8 @@ struct FuzzArguments {
 std::string footer() {
   std::string text =
       "Each seed gives a small scene and a hostile or harmless state in it. A campaign takes consecutive\n"
-      "seeds; campaigns of disjoint seeds may run side by side, and tools/python/merge_fuzz.py joins their\n"
+      "seeds; campaigns of disjoint seeds may run side by side: `decant campaign fuzz` of the Python package\n"
+      "shares seeds out to the workers of a cluster, and tools/python/merge_fuzz.py joins any campaigns'\n"
       "reports. What fails is minimised and written as a fixture, which `decant conform` shows again, with\n"
       "its scene beside it. Ctrl-C ends a campaign and keeps what it found: exit status 130.\n"
       "\n"
