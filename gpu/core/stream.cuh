@@ -179,11 +179,14 @@ class Stream {
   /// What `work` launches; none of it runs.
   template <class Work>
   LaunchList list(Work work) {
+    struct Ending {
+      LaunchList*& listed;
+      ~Ending() { listed = nullptr; }
+    } ending{listed_};
     run_transfers();
     LaunchList launches;
     listed_ = &launches;
     work();
-    listed_ = nullptr;
     return launches;
   }
   /// What `work` launches, as a graph; none of it runs.

@@ -42,10 +42,12 @@ DECANT_KERNEL(256) transfer_kernel(int n, const Transfer* list, const char* uplo
 class TransferQueue {
  public:
   bool empty() const { return list_.empty(); }
+  /// Each after what was put off before, where that is to the same place.
   void fill_ones(void* to, std::size_t bytes) {
-    if (bytes > 0) list_.push_back({static_cast<char*>(to), static_cast<std::uint32_t>(bytes), -1});
+    if (bytes == 0) return;
+    forget_inside(static_cast<char*>(to), bytes);
+    list_.push_back({static_cast<char*>(to), static_cast<std::uint32_t>(bytes), -1});
   }
-  /// After what was put off before, where that is to the same place.
   void upload(void* to, const void* from, std::size_t bytes) {
     if (bytes == 0) return;
     forget_inside(static_cast<char*>(to), bytes);
