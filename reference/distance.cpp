@@ -66,7 +66,7 @@ template <class Inside>
 SurfaceDistance box_distance(const std::vector<BoxFace>& faces, const Vec3& x, Inside inside) {
   double best = std::numeric_limits<double>::infinity();
   Vec3 offset = Vec3::Zero();
-  const BoxFace* at = &faces.front();
+  const BoxFace* at = nullptr;
   for (const auto& face : faces) {
     const Vec3 to_x = offset_from(face, x);
     const double squared = to_x.squaredNorm();
