@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 namespace decant::gpu {
 namespace {
@@ -29,9 +30,8 @@ class SceneArrays {
       room_ = std::min(total_, n_ + static_cast<int>(layers) + n_ / 50) + tile_size;
     }
     // The same walls in another state or another time: tests and parameter studies load one scene again and again.
-    if (problem.geometry != loaded_geometry_ || geometry_.containers != containers_)
-      load_geometry(stream, problem.geometry);
-    if (problem.walls != loaded_walls_ || walls_.version == 0) load_walls(stream, problem.walls);
+    if (loaded_geometry_ != problem.geometry) load_geometry(stream, problem.geometry);
+    if (loaded_walls_ != problem.walls) load_walls(stream, problem.walls);
     walls_.walls.rest_density = c_.rest_density;
     allocate(stream, 0);
     upload_rows(stream, state_.position, problem.position,
@@ -92,7 +92,7 @@ class SceneArrays {
   std::vector<float> boundary_volumes() const { return wall_volume_.download(static_cast<std::size_t>(m_)); }
   void set_boundary_volumes(const std::vector<float>& volume) { wall_volume_.upload(volume); }
   /// The next load finds other walls than there are.
-  void forget_walls() { loaded_walls_ = {}; }
+  void forget_walls() { loaded_walls_.reset(); }
 
   void save_state(Stream& stream) {
     stream.launch(copy_state_kernel, n_,
@@ -130,7 +130,7 @@ class SceneArrays {
   static constexpr std::size_t saved_bytes = 2 * 16 + 4;  // per particle
 
   void load_geometry(Stream& stream, const Geometry& geometry) {
-    loaded_geometry_ = {};  // should anything below fail
+    loaded_geometry_.reset();  // should anything below fail
     stream.upload(shapes_, geometry.shapes);
     stream.upload(edges_, geometry.edges);
     stream.upload(boxes_, geometry.boxes);
@@ -148,7 +148,7 @@ class SceneArrays {
     std::vector<float> rows;
     std::vector<int> ids, containers;
     const std::uint64_t version = walls_.version + 1;
-    loaded_walls_ = {};  // should anything below fail
+    loaded_walls_.reset();  // should anything below fail
     walls_ = {};
     bool any_moves = false;
     for (std::size_t c = 0; c + 1 < walls.container_begin.size(); ++c) {
@@ -251,8 +251,8 @@ class SceneArrays {
   Buffer<Box> boxes_;
   Buffer<Face> faces_;
   DeviceGeometry geometry_{};
-  Geometry loaded_geometry_;
-  WallSamples loaded_walls_;
+  std::optional<Geometry> loaded_geometry_;  // what is on the device; none: nothing to rely on
+  std::optional<WallSamples> loaded_walls_;
   Buffer<DevicePose> poses_;
   ParticleBuffers state_, spare_;
   Buffer<int> id_;
