@@ -34,7 +34,8 @@ concept NeighborRange = requires(const Range range, Team& team, const Float3 (&x
 template <class Search>
 concept NeighborSearch =
     requires(Search search, const Search& constant, Stream& stream, const Constants& c, ParticleArrays& arrays,
-             const WallStore& walls, const Box& region, const DeviceGeometry& geometry, Branch branch, int entries) {
+             const WallStore& walls, const Box& region, const DeviceGeometry& geometry, Branch branch, int substeps,
+             const DeviceStatus& status) {
       requires std::constructible_from<Search, const SolverOptions&>;
       // Whether positions carry |x|² in place of a wall particle's ρ0 V_b and the mass.
       { Search::stores_square } -> std::convertible_to<bool>;
@@ -52,11 +53,11 @@ concept NeighborSearch =
       // After kernels have run without an integration: the state is where it was.
       search.restore_state(stream, arrays);
       // All of an advance in one launch; false: substep by substep.
-      { search.template advance<false>(stream, arrays, geometry, entries) } -> std::same_as<bool>;
+      { search.template advance<false>(stream, arrays, geometry, substeps) } -> std::same_as<bool>;
       // Whether substeps can be captured in a graph.
       { constant.capturable() } -> std::same_as<bool>;
-      // More list entries per particle; whether anything changed.
-      { search.grow(entries) } -> std::same_as<bool>;
+      // More room where an advance or an evaluation found too little; whether anything changed.
+      { search.grow(status) } -> std::same_as<bool>;
       { constant.bytes() } -> std::same_as<std::size_t>;
     };
 

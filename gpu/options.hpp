@@ -27,6 +27,7 @@ struct SolverOptions {
   int lanes = 0;                      // threads a particle; 0: by the number of particles
   int capacity = 0;                   // entries a list begins with; 0: by the skin
   Launch launch = Launch::automatic;  // of substeps: many at once, recorded as graphs, one by one
+  bool tiles = false;                 // list: small scenes in shared memory
   int ranks = 1;                      // threads of this process that share the particles
   double halo_margin = -1;            // of H: how far ghosts reach beyond it; negative: by speed and size
   bool verify = false;                // list: counts in every substep what its lists miss (verify.cuh)

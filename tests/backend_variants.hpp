@@ -4,6 +4,8 @@
 
 #include "gpu/backends.hpp"
 
+#include <gtest/gtest.h>
+
 #include <cctype>
 #include <memory>
 #include <string>
@@ -26,6 +28,7 @@ inline std::vector<std::string> backend_variants() {
           "hash:ranks=2:force_neighbors=recomputed:halo_margin=0.1",
           "list",
           "list:ranks=3",
+          "list:tiles=on",
           "list:launch=graph",
           "list:build=all-pairs",
           "list:rebuild=3:skin=0.3",
@@ -44,6 +47,11 @@ inline std::string plain_name(const std::string& variant, Executor executor) {
   std::string name;
   for (const char c : variant) name += std::isalnum(static_cast<unsigned char>(c)) ? c : '_';
   return name + (executor == Executor::host ? "Host" : "Cuda");
+}
+
+/// Of a test that runs on every executor.
+inline std::string executor_name(const testing::TestParamInfo<Executor>& info) {
+  return info.param == Executor::host ? "Host" : "Cuda";
 }
 
 }  // namespace decant::test

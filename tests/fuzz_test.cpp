@@ -75,7 +75,7 @@ TEST(Campaign, WhatItOnceFoundIsSettled) {
     if (entry.path().extension() != ".h5") continue;
     const Fixture fixture = read_fixture(entry.path());
     const PreparedReference oracle = prepare_reference(fixture);
-    for (const char* name : {"brute", "hash", "list", "list:criterion=relative"})
+    for (const char* name : {"brute", "hash", "list", "list:tiles=on", "list:criterion=relative"})
       for (const CheckRow& row : run_checks(*on_host(name), fixture, oracle))
         EXPECT_EQ(verdict_of(row), Verdict::pass)
             << fixture.name << " " << name << " " << row.check << " " << row.field << ": " << row.reason;

@@ -31,10 +31,7 @@ class KeptList : public testing::TestWithParam<Executor> {
   static std::unique_ptr<Backend> make(const std::string& name) { return test::make_variant(name, GetParam()); }
 };
 
-std::string executor_name(const testing::TestParamInfo<Executor>& info) {
-  return info.param == Executor::host ? "Host" : "Cuda";
-}
-INSTANTIATE_TEST_SUITE_P(On, KeptList, testing::Values(Executor::host, Executor::cuda), executor_name);
+INSTANTIATE_TEST_SUITE_P(On, KeptList, testing::Values(Executor::host, Executor::cuda), test::executor_name);
 
 /// A cloud that falls in on itself, in one run. What lists that were too short spoiled must not show.
 TEST_P(KeptList, ThatOverflowsInARunLeavesTheBitsThatAmpleRoomLeaves) {

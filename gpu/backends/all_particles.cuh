@@ -66,7 +66,7 @@ class AllParticles {
     return false;
   }
   bool capturable() const { return false; }
-  bool grow(int) { return false; }
+  bool grow(const DeviceStatus&) { return false; }
   std::size_t bytes() const { return segments_.bytes(); }
 
  private:

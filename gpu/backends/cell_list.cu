@@ -120,7 +120,7 @@ class CellList {
   bool capturable() const {
     return o_.launch != SolverOptions::Launch::plain && o_.sort == SolverOptions::Sort::counting;
   }
-  bool grow(int longest) { return lists_.grow(room_, longest); }
+  bool grow(const DeviceStatus& status) { return lists_.grow(room_, status.longest_list); }
   std::size_t bytes() const { return fluid_.bytes() + wall_cells_.bytes() + scratch_.bytes() + lists_.bytes(); }
 
  private:

@@ -1,11 +1,14 @@
 /// \file
 /// list: Verlet lists that reach to H and a skin, rebuilt when a pair could be missed (kernels/rebuild_criterion.cuh)
 /// or every N substeps, which the device decides. Below some 300,000 particles all substeps of an advance are one
-/// persistent kernel.
+/// persistent kernel; below some 15,000 lists are in the shared memory of the multiprocessors, in tiles
+/// (kernels/tile_memory.cuh).
 #include "gpu/backends/list_storage.cuh"
+#include "gpu/backends/tile_storage.cuh"
 #include "gpu/backends/wall_cells.cuh"
 #include "gpu/kernels/check_lists.cuh"
 #include "gpu/kernels/persistent_list.cuh"
+#include "gpu/kernels/persistent_tiles.cuh"
 #include "gpu/solver/solver.cuh"
 
 namespace decant::gpu {
@@ -22,13 +25,18 @@ class NeighborList {
     n_ = a.n;
     room_ = a.room;
     walls_ = walls;
-    widest_skin_ = static_cast<float>(o_.skin < 0 ? widest : o_.skin) * c.H;
+    const bool at_once = o_.launch == SolverOptions::Launch::automatic && !o_.verify && from_cells() &&
+                         criterion() != Criterion::relative && !a.on_ranks();
+    const bool tiled = at_once && o_.tiles && !c.any_periodic;
+    const double usual = tiled ? widest_of_tiles : widest;
+    widest_skin_ = static_cast<float>(o_.skin < 0 ? usual : o_.skin) * c.H;
     const float reach = c.H + widest_skin_;
 #ifdef __CUDACC__
-    lanes_ = std::min(o_.lanes            ? o_.lanes
-                      : n_ < 25000        ? 4
-                      : is_large(a.total) ? 1
-                                          : 2,
+    lanes_ = std::min(o_.lanes                  ? o_.lanes
+                      : tiled && fits_tiles(n_) ? TileSet::lanes
+                      : n_ < 25000              ? 4
+                      : is_large(a.total)       ? 1
+                                                : 2,
                       c.any_periodic ? most_lanes<true> : most_lanes<false>);
 #endif
     table_ = {c, region, reach, is_large(a.total) ? room_ : a.total};
@@ -46,9 +54,12 @@ class NeighborList {
     scene_.set(c, a.total, region);
     lists_.reserve(room_, lanes_);
     persistent_blocks_ = 0;
-    if (o_.launch != SolverOptions::Launch::automatic || o_.verify || !from_cells() ||
-        criterion() == Criterion::relative || a.on_ranks())
-      return;
+    tiles_.clear();
+    if (!at_once) return;
+    if (tiled && lanes_ == TileSet::lanes && fits_tiles(n_))
+      tiles_.prepare(stream, persistent_tiles_kernel, n_, a.sentinel, a.containers, fluid_.table(),
+                     1 + (o_.skin < 0 ? usual : o_.skin));
+    if (tiles_.there()) return;
     with_periodic(c_, [&](auto periodic) {
       constexpr bool p = decltype(periodic)::value;
       this->template with_persistent_lanes<p>([&](auto lanes) {
@@ -71,7 +82,8 @@ class NeighborList {
     const bool predicts = o_.rebuild == 0;
     if (o_.skin < 0 || predicts) stream.launch(find_fastest_kernel, n_, FindFastest{a, a.state.velocity});
     const float least = o_.skin < 0 ? static_cast<float>(narrowest) * c_.H : widest_skin_;
-    stream.launch(choose_skin_kernel, 1, ChooseSkin{c_, a.status, least, widest_skin_, predicts});
+    stream.launch(choose_skin_kernel, 1,
+                  ChooseSkin{c_, a.status, least, widest_skin_, predicts, tiles_.there() ? 6.0f : 0.9f});
   }
 
   template <bool periodic>
@@ -108,6 +120,12 @@ class NeighborList {
 
   template <bool periodic>
   bool advance(Stream& stream, const ParticleArrays& a, const DeviceGeometry& geometry, int substeps) {
+    if constexpr (!periodic)
+      if (tiles_.there()) {
+        advance_tiles(stream, a, geometry, substeps);
+        return true;
+      }
+    tiles_.serve_again();
     if (persistent_blocks_ == 0) return false;
     with_persistent_lanes<periodic>([&](auto lanes) {
       this->template advance_at_once<decltype(lanes)::value, periodic>(stream, a, geometry, substeps);
@@ -115,10 +133,13 @@ class NeighborList {
     return true;
   }
   bool capturable() const { return o_.launch != SolverOptions::Launch::plain; }
-  bool grow(int longest) { return lists_.grow(room_, longest); }
+  bool grow(const DeviceStatus& status) {
+    if (lists_.grow(room_, status.longest_list)) return true;
+    return status.tile_bytes != 0 && tiles_.grow(status.tile_bytes);
+  }
   std::size_t bytes() const {
     return fluid_.bytes() + wall_cells_.bytes() + scratch_.bytes() + bucket_.bytes() + lists_.bytes() +
-           origin_.bytes() + boxes_.bytes() + checker_.bytes();
+           origin_.bytes() + boxes_.bytes() + checker_.bytes() + tiles_.bytes();
   }
 
  private:
@@ -172,6 +193,29 @@ class NeighborList {
     call(std::integral_constant<int, 1>());
 #endif
   }
+  void advance_tiles(Stream& stream, const ParticleArrays& a, const DeviceGeometry& geometry, int substeps) {
+    const FluidSource source = fluid_source(a, geometry);
+    const TileOrder order = tiles_.order(fluid_.table());
+    const BlockMemory memory = tiles_.memory();
+    launch_persistent(stream, persistent_tiles_kernel, memory.blocks, static_cast<std::size_t>(memory.bytes), substeps,
+                      TileSubstep{n_,
+                                  walls_.moving_count(),
+                                  a.status,
+                                  walls_.moving<WallsFor::density>(a),
+                                  source,
+                                  fluid_.counter(source, scratch_),
+                                  fluid_.counts(),
+                                  fluid_.starts(),
+                                  bucket_bounds(),
+                                  reinterpret_cast<int*>(scratch_.scan.get()),
+                                  fluid_.scatter(source, scratch_),
+                                  order,
+                                  TileOrder::rows(fluid_.table()),
+                                  fluid_.order(TiledFluidSource{source, order}, scratch_),
+                                  {{c_, a, lists_.lists(a), walls_.walls, walls_.first_moving, walls_.moving_end,
+                                    origin_.get(), order.particle, tiles_.terms(), memory}},
+                                  {c_, a, geometry, {c_, a, rebuild_criterion({})}}});
+  }
   std::size_t persistent_shared_bytes() const { return BuildList<false>::shared_bytes(lanes_, persistent_block); }
   template <int lanes, bool periodic>
   void advance_at_once(Stream& stream, const ParticleArrays& a, const DeviceGeometry& geometry, int substeps) {
@@ -186,7 +230,7 @@ class NeighborList {
                                             fluid_.counter(source, scratch_),
                                             fluid_.counts(),
                                             fluid_.starts(),
-                                            fluid_.table().buckets + 1,
+                                            bucket_bounds(),
                                             reinterpret_cast<int*>(scratch_.scan.get()),
                                             fluid_.scatter(source, scratch_),
                                             fluid_.order(source, scratch_),
@@ -197,6 +241,8 @@ class NeighborList {
                                             walls_.moving<WallsFor::density>(a)});
   }
 
+  /// Where buckets begin, and where the last one ends.
+  int bucket_bounds() const { return fluid_.table().buckets + 1; }
   FluidSource fluid_source(const ParticleArrays& a, const DeviceGeometry& geometry) const {
     return {c_, a, a.state, a.spare, bucket_.get(), origin_.get(), geometry};
   }
@@ -208,8 +254,8 @@ class NeighborList {
     return {{c_}, lists_.lists(a)};
   }
 
-  // Bounds of a skin that is chosen here, and what lists are first made for; shares of H.
-  static constexpr double narrowest = 0.06, usual = 0.2, widest = 0.2;
+  // Bounds of a skin that is chosen here, shares of H; lists are first made for the widest.
+  static constexpr double narrowest = 0.06, widest = 0.2, widest_of_tiles = 0.4;
 
   SolverOptions o_;
   Constants c_{};
@@ -223,6 +269,7 @@ class NeighborList {
   WallCells wall_cells_;
   SortScratch scratch_;
   ListStorage lists_;
+  TileStorage tiles_;
   Buffer<float4> origin_;
   Buffer<int> bucket_;
   Buffer<DisplacementBox> boxes_;

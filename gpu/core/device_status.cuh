@@ -9,12 +9,14 @@ namespace {
 
 struct DeviceStatus {
   static constexpr unsigned long long none = ~0ull;
+  static constexpr int never = 0x7FFFFFFF;
 
   unsigned long long non_finite, escaped;   // (substep << 32) | smallest id, or none
   unsigned long long missed_pair;           // the same, of complete lists
   unsigned substeps_begun, substeps_ended;  // of this advance: whose densities, and whose end positions,
                                             // are known or being computed
   int longest_list;                         // entries that the longest list needs
+  int tile_bytes;                           // memory that the largest tile needs, if one found no room; or `never`
   int rebuilds;
   int rebuild_needed;                  // neighbors must be found again
   float skin;                          // of the lists of this advance, m

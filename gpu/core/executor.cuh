@@ -40,13 +40,20 @@ namespace {
 struct alignas(16) float4 {
   float x, y, z, w;
 };
+struct alignas(8) float2 {
+  float x, y;
+};
 struct alignas(8) int2 {
   int x, y;
+};
+struct alignas(8) uint2 {
+  unsigned x, y;
 };
 struct alignas(16) int4 {
   int x, y, z, w;
 };
 inline float4 make_float4(float x, float y, float z, float w) { return {x, y, z, w}; }
+inline float2 make_float2(float x, float y) { return {x, y}; }
 inline int2 make_int2(int x, int y) { return {x, y}; }
 inline int4 make_int4(int x, int y, int z, int w) { return {x, y, z, w}; }
 using ::fabsf;
@@ -87,6 +94,7 @@ DECANT_DEVICE int lowest_bit(unsigned mask) {
 DECANT_DEVICE void atomic_minimum(unsigned long long* to, unsigned long long value) { atomicMin(to, value); }
 DECANT_DEVICE void atomic_minimum(int* to, int value) { atomicMin(to, value); }
 DECANT_DEVICE void atomic_maximum(int* to, int value) { atomicMax(to, value); }
+DECANT_DEVICE void atomic_or(unsigned* to, unsigned value) { atomicOr(to, value); }
 /// Adds 1; returns what was there.
 DECANT_DEVICE int atomic_increment(int* to) { return atomicAdd(to, 1); }
 /// Two's complement adds alike with and without sign.
@@ -111,6 +119,7 @@ inline void atomic_maximum(int* to, int value) {
   while (value > seen && !at.compare_exchange_weak(seen, value)) {
   }
 }
+inline void atomic_or(unsigned* to, unsigned value) { std::atomic_ref<unsigned>(*to).fetch_or(value); }
 inline int atomic_increment(int* to) { return std::atomic_ref<int>(*to).fetch_add(1); }
 inline void atomic_add(long long* to, int value) {
   std::atomic_ref<long long>(*to).fetch_add(value, std::memory_order_relaxed);

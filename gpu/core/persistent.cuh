@@ -6,8 +6,13 @@
 ///
 /// A persistent grid has one block per multiprocessor, all there at once. Each block has a run of neighboring
 /// particles, so that what it reads stays in its cache. On the host it is one thread that starts OpenMP's.
+///
+/// A PersistentBlock is one of its blocks with its own memory, which lasts as long as the kernel: shared memory, on the
+/// host a part of what BlockMemory names. Whatever it does is done in a call of `for_each_block`, on the host for one
+/// block after the other.
 #pragma once
 
+#include "gpu/core/staging_buffer.cuh"
 #include "gpu/core/stream.cuh"
 
 #include <algorithm>
@@ -27,7 +32,66 @@ namespace {
 /// Threads per block; as many as find room with 72 registers each.
 inline constexpr int persistent_block = 896;
 
+/// Memory of blocks, `bytes` each; on the device it is shared memory, and `all` null.
+struct BlockMemory {
+  char* all;
+  int blocks, bytes;
+};
+
 #ifdef __CUDACC__
+
+class PersistentBlock {
+ public:
+  DECANT_DEVICE int number() const { return static_cast<int>(blockIdx.x); }
+  DECANT_DEVICE char* memory() const { return shared_memory(); }
+  /// What its threads have written is there for all of them.
+  DECANT_DEVICE void sync() const { __syncthreads(); }
+  /// body(k) for k in 0 … n−1, by neighboring threads for neighboring k.
+  template <class Body>
+  DECANT_DEVICE void for_each(int n, const Body& body) const {
+#pragma unroll 1
+    for (int k = static_cast<int>(threadIdx.x); k < n; k += persistent_block) body(k);
+  }
+  /// store(k, load(k)) for k in 0 … n−1; a thread's next `ahead` loads are under way together.
+  template <int ahead, class Load, class Store>
+  DECANT_DEVICE void copy(int n, const Load& load, const Store& store) const {
+#pragma unroll 1
+    for (int k = static_cast<int>(threadIdx.x); k < n; k += ahead * persistent_block) {
+      decltype(load(k)) values[ahead];
+#pragma unroll
+      for (int b = 0; b < ahead; ++b) {
+        const int at = k + b * persistent_block;
+        values[b] = load(at < n ? at : k);
+      }
+#pragma unroll
+      for (int b = 0; b < ahead; ++b) {
+        const int at = k + b * persistent_block;
+        if (at < n) store(at, values[b]);
+      }
+    }
+  }
+  template <class Body>
+  DECANT_DEVICE void once(const Body& body) const {
+    if (threadIdx.x == 0) body();
+  }
+  /// store(k, value(0) + … + value(k−1)) for k in 0 … n−1; the sum of all, on every thread, after a sync.
+  template <class Value, class Store>
+  DECANT_DEVICE int exclusive_scan(int n, const Value& value, const Store& store) const {
+    using Scan = cub::BlockScan<int, persistent_block>;
+    __shared__ typename Scan::TempStorage memory;
+    const int each = (n + persistent_block - 1) / persistent_block, begin = each * static_cast<int>(threadIdx.x);
+    const int end = begin + each < n ? begin + each : n;
+    int sum = 0, before, all;
+    for (int k = begin; k < end; ++k) sum += value(k);
+    Scan(memory).ExclusiveSum(sum, before, all);
+    for (int k = begin; k < end; ++k) {
+      store(k, before);
+      before += value(k);
+    }
+    sync();
+    return all;
+  }
+};
 
 class PersistentGrid {
  public:
@@ -50,6 +114,11 @@ class PersistentGrid {
       SubWarp<lanes> team(i);
       body(team);
     });
+  }
+  /// body(block) by all threads of each block.
+  template <class Body>
+  DECANT_DEVICE void for_each_block(const BlockMemory&, const Body& body) const {
+    body(PersistentBlock());
   }
   /// out[k] = in[0] + … + in[k−1], k < n; both have room for whole fours. Each block sums a share, and then adds
   /// up those before its own: block_sums[blocks].
@@ -143,21 +212,36 @@ class PersistentTimer {
   long long last_;
 };
 
+/// Blocks of a persistent grid on this device, at most.
+inline int most_blocks() {
+  int device = 0, blocks = 0;
+  CUDA_CHECK(cudaGetDevice(&device));
+  CUDA_CHECK(cudaDeviceGetAttribute(&blocks, cudaDevAttrMultiProcessorCount, device));
+  return std::min(blocks, most_persistent_blocks);
+}
+
+/// Bytes of dynamic shared memory that a block of the kernel may have.
+template <class Kernel>
+std::size_t most_shared_bytes(Kernel kernel) {
+  int device = 0, most = 0;
+  CUDA_CHECK(cudaGetDevice(&device));
+  CUDA_CHECK(cudaDeviceGetAttribute(&most, cudaDevAttrMaxSharedMemoryPerBlockOptin, device));
+  cudaFuncAttributes attributes{};
+  CUDA_CHECK(cudaFuncGetAttributes(&attributes, kernel));
+  return static_cast<std::size_t>(most) - attributes.sharedSizeBytes;
+}
+
 /// Blocks of a persistent grid that runs the kernel with so many bytes of shared memory per block, or 0 where
 /// there is no room for one on each multiprocessor.
 template <class Kernel>
 int persistent_blocks(Kernel kernel, std::size_t shared_bytes) {
-  int device = 0, blocks = 0, cooperates = 0, most_shared = 0, resident = 0;
+  int device = 0, cooperates = 0, resident = 0;
   CUDA_CHECK(cudaGetDevice(&device));
-  CUDA_CHECK(cudaDeviceGetAttribute(&blocks, cudaDevAttrMultiProcessorCount, device));
   CUDA_CHECK(cudaDeviceGetAttribute(&cooperates, cudaDevAttrCooperativeLaunch, device));
-  CUDA_CHECK(cudaDeviceGetAttribute(&most_shared, cudaDevAttrMaxSharedMemoryPerBlockOptin, device));
-  cudaFuncAttributes attributes{};
-  CUDA_CHECK(cudaFuncGetAttributes(&attributes, kernel));
-  if (!cooperates || shared_bytes + attributes.sharedSizeBytes > static_cast<std::size_t>(most_shared)) return 0;
+  if (!cooperates || shared_bytes > most_shared_bytes(kernel)) return 0;
   CUDA_CHECK(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize, static_cast<int>(shared_bytes)));
   CUDA_CHECK(cudaOccupancyMaxActiveBlocksPerMultiprocessor(&resident, kernel, persistent_block, shared_bytes));
-  return resident < 1 ? 0 : std::min(blocks, most_persistent_blocks);
+  return resident < 1 ? 0 : most_blocks();
 }
 
 /// kernel(times, argument) by a persistent grid of so many blocks.
@@ -179,8 +263,48 @@ void launch_persistent(Stream& stream, void (*kernel)(int, Argument), int blocks
 
 #else
 
+class PersistentBlock {
+ public:
+  PersistentBlock(int number, char* memory) : number_(number), memory_(memory) {}
+  int number() const { return number_; }
+  char* memory() const { return memory_; }
+  void sync() const {}
+  template <class Body>
+  void for_each(int n, const Body& body) const {
+    for (int k = 0; k < n; ++k) body(k);
+  }
+  template <int, class Load, class Store>
+  void copy(int n, const Load& load, const Store& store) const {
+    for (int k = 0; k < n; ++k) store(k, load(k));
+  }
+  template <class Body>
+  void once(const Body& body) const {
+    body();
+  }
+  template <class Value, class Store>
+  int exclusive_scan(int n, const Value& value, const Store& store) const {
+    int before = 0;
+    for (int k = 0; k < n; ++k) {
+      const int here = value(k);
+      store(k, before);
+      before += here;
+    }
+    return before;
+  }
+
+ private:
+  int number_;
+  char* memory_;
+};
+
 class PersistentGrid {
  public:
+  template <class Body>
+  void for_each_block(const BlockMemory& m, const Body& body) const {
+    for_each_thread(m.blocks, [&](int b) {
+      body(PersistentBlock(b, m.all + static_cast<std::size_t>(b) * static_cast<std::size_t>(m.bytes)));
+    });
+  }
   void sync() const {}
   template <class Body>
   void once(const Body& body) const {
@@ -214,6 +338,12 @@ class PersistentTimer {
   Clock::time_point last_ = Clock::now();
 };
 
+/// As if it were a device, of few and small multiprocessors.
+inline int most_blocks() { return most_persistent_blocks; }
+template <class Kernel>
+std::size_t most_shared_bytes(Kernel) {
+  return 227u << 10;
+}
 template <class Kernel>
 int persistent_blocks(Kernel, std::size_t) {
   return 1;

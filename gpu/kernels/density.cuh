@@ -25,12 +25,33 @@ struct BeginSubstep {
   }
 };
 
-template <class Neighbors>
+/// ρ, p and what the force of a neighbor asks of a particle, p/ρ² and 1/ρ.
+struct DensityResult {
+  float density, pressure, pressure_term, inverse_density;
+};
+
+/// Leaves what neighbors read, and the fields of an evaluation.
+struct StoreDensity {
+  OutputArrays out;
+
+  DECANT_DEVICE void operator()(const ParticleArrays& a, int i, Float3 x, const DensityResult& found) const {
+    const float4 v = a.current.velocity[i];
+    a.force_position[i] = make_float4(x.x, x.y, x.z, found.pressure_term);
+    a.force_velocity[i] = make_float4(v.x, v.y, v.z, found.inverse_density);
+    if (!out.density) return;
+    const int id = a.id[i];
+    out.density[id] = found.density;
+    out.pressure[id] = found.pressure;
+  }
+};
+
+/// then(a, i, x, DensityResult) for every particle.
+template <class Neighbors, class Then = StoreDensity>
 struct Density {
   Constants c;
   ParticleArrays a;
   Neighbors neighbors;
-  OutputArrays out;
+  Then then;
 
   template <class Team>
   DECANT_DEVICE void operator()(Team& team) const {
@@ -56,22 +77,15 @@ struct Density {
   DECANT_DEVICE void finish(Team& team, int k, Float3 x, float sum) const {
     const float density = team.sum(sum);
     if (!team.active(k) || !team.is_leader()) return;
-    const int i = team.particle(k);
     const float p = pressure_at(c, density);
-    const float4 v = a.current.velocity[i];
-    a.force_position[i] = make_float4(x.x, x.y, x.z, p / (density * density));
-    a.force_velocity[i] = make_float4(v.x, v.y, v.z, 1.0f / density);
-    if (!out.density) return;
-    const int id = a.id[i];
-    out.density[id] = density;
-    out.pressure[id] = p;
+    then(a, team.particle(k), x, {density, p, p / (density * density), 1.0f / density});
   }
 };
 
 template <class Team, class Neighbors>
 DECANT_KERNEL(Team::block_size, Team::blocks_per_multiprocessor)
 density_kernel(int n, Density<Neighbors> density) {
-  once(BeginSubstep{density.a, !density.out.density});
+  once(BeginSubstep{density.a, !density.then.out.density});
   for_each_team<Team>(n, density);
 }
 

@@ -25,30 +25,49 @@ struct Integrate {
   DeviceGeometry geometry;
   After after;
 
+  /// What has become of a particle in a substep, so far.
+  struct Moved {
+    Float3 x, v, free_of_contact, displacement;
+    float clearance;  // that walls keep from it at least; see may_touch
+  };
+
   /// By all threads of the particle's team.
   static constexpr bool by_team = true;
   template <class Team>
   DECANT_DEVICE void operator()(const Team& team, int i, Float3 x, Float3 v, Float3 acceleration) const {
     const auto prefetched = after.prefetch(i);
-    const float old_clearance = a.current.velocity[i].w, wall_step = a.status->wall_step;
+    Moved m = move(x, v, acceleration, a.current.velocity[i].w, a.status->wall_step);
+    if (may_touch(m)) touch(team, a.poses_after(), m);
+    if (team.is_leader()) store(i, m, prefetched);
+  }
+  /// Free of contact.
+  DECANT_DEVICE Moved move(Float3 x, Float3 v, Float3 acceleration, float clearance, float wall_step) const {
     v = v + c.dt * acceleration;
     const Float3 displacement = c.dt * v;
     x = x + displacement;
     x = {wrap(0, x.x), wrap(1, x.y), wrap(2, x.z)};
-    const Float3 free_of_contact = x;
     const float rounding = rounding_of(x);
-    float clearance = old_clearance - (1.001f * (sqrtf(dot(displacement, displacement)) + wall_step) + rounding);
-    if (!(clearance > 1.001f * c.contact_distance + rounding))
-      clearance = collide(team, c, geometry, a.poses_after(), x, v);
-    if (collide_with_floor(c, x, v)) clearance = 0.0f;
-    if (!team.is_leader()) return;
+    return {x, v, x, displacement,
+            clearance - (1.001f * (sqrtf(dot(displacement, displacement)) + wall_step) + rounding)};
+  }
+  DECANT_DEVICE bool may_touch(const Moved& m) const {
+    return !(m.clearance > 1.001f * c.contact_distance + rounding_of(m.x));
+  }
+  template <class Team>
+  DECANT_DEVICE void touch(const Team& team, const DevicePose* poses, Moved& m) const {
+    m.clearance = collide(team, c, geometry, poses, m.x, m.v);
+  }
+  /// The floor, the checks, and the state at the end of the substep.
+  DECANT_DEVICE void store(int i, Moved& m, const typename After::Prefetched& prefetched) const {
+    Float3 &x = m.x, &v = m.v;
+    if (collide_with_floor(c, x, v)) m.clearance = 0.0f;
     if (i == 0) ++a.status->substeps_ended;
-    if (a.farthest) note_displacement(displacement + (x - free_of_contact));
+    if (a.farthest) note_displacement(m.displacement + (x - m.free_of_contact));
     if (!is_finite(x) || !is_finite(v)) report(&a.status->non_finite, a.status->substeps_begun, a.id[i]);
     else if (escaped(0, x.x) || escaped(1, x.y) || escaped(2, x.z))
       report(&a.status->escaped, a.status->substeps_begun, a.id[i]);
     a.next.position[i] = a.stores_square ? with_square(x) : make_float4(x.x, x.y, x.z, c.mass);
-    a.next.velocity[i] = make_float4(v.x, v.y, v.z, clearance);
+    a.next.velocity[i] = make_float4(v.x, v.y, v.z, m.clearance);
     after(i, x, prefetched);
   }
 

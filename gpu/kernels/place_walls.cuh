@@ -41,12 +41,16 @@ DECANT_DEVICE void place_wall_for_density(const ParticleArrays& a, const Walls& 
   a.current.position[a.base + slot] =
       a.stores_square ? with_square(x) : make_float4(x.x, x.y, x.z, w.rest_density * w.volume[id]);
 }
+/// What forces see of it beside its place: its velocity, and its volume.
+DECANT_DEVICE float4 wall_velocity(const DevicePose& pose, Float3 x, float volume) {
+  const Float3 v = surface_velocity(pose, x);
+  return make_float4(v.x, v.y, v.z, volume);
+}
 /// Where forces see it.
 DECANT_DEVICE void place_wall_for_force(const ParticleArrays& a, const Walls& w, int slot, Float3 x, int id,
                                         const DevicePose& pose) {
-  const Float3 v = surface_velocity(pose, x);
   a.force_position[a.base + slot] = make_float4(x.x, x.y, x.z, 0.0f);
-  a.force_velocity[a.base + slot] = make_float4(v.x, v.y, v.z, w.volume[id]);
+  a.force_velocity[a.base + slot] = wall_velocity(pose, x, w.volume[id]);
 }
 DECANT_DEVICE void place_wall(const ParticleArrays& a, const Walls& w, int slot, Float3 x, int id,
                               const DevicePose& pose) {

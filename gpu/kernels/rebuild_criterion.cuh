@@ -62,10 +62,10 @@ struct ChooseSkin {
   DeviceStatus* status;
   float least, most;  // m
   bool predicts;
+  float build_to_growth;  // b/g, as measured
 
   DECANT_DEVICE void operator()(int) const {
-    constexpr float build_to_growth = 0.9f;  // b/g as measured
-    constexpr float faster = 1.12f;          // than now, soon
+    constexpr float faster = 1.12f;  // than now, soon
     const float per_substep = faster * radius(unordered(status->fastest)).r * c.dt;
     const float way = fmaxf(1e-6f * c.H, predicts ? per_substep : 2.0f * per_substep);
     const float best = rintf(radius(build_to_growth * c.H / way).r) - 1.0f, fits = floorf(most / way);

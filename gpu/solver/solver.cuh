@@ -367,9 +367,9 @@ class Solver : public DeviceSolver {
     add(times_.force, 2, substeps);
   }
 
-  /// Whether lists were too short and have grown. Graphs know where the lists were.
+  /// Whether there was too little room and is more now. Graphs know where the lists were.
   bool grow(const DeviceStatus& status) {
-    const bool grown = status.longest_list != 0 && search_.grow(status.longest_list);
+    const bool grown = (status.longest_list != 0 || status.tile_bytes != 0) && search_.grow(status);
     if (grown) {
       long_graph_.clear();
       short_graph_.clear();
@@ -399,7 +399,7 @@ class Solver : public DeviceSolver {
     if (from.escaped != DeviceStatus::none) status.bits |= Status::escaped;
     if (from.missed_pair != DeviceStatus::none) status.bits |= Status::missed_pair;
     // Nobody grew what was too short: whatever came out of it is not to be used.
-    if (from.longest_list != 0) status.bits |= Status::capacity;
+    if (from.longest_list != 0 || from.tile_bytes != 0) status.bits |= Status::capacity;
     if (first != DeviceStatus::none) {
       status.particle = static_cast<std::int64_t>(first & 0xFFFFFFFFull);
       if (halo_) status.particle = halo_->problem_id(status.particle);

@@ -10,6 +10,7 @@ nothing can show a change; such a one must not be caught, or the reason is wrong
 """
 
 import rank_faults
+import tile_faults
 
 FAULTS = []
 
@@ -68,7 +69,7 @@ fault("self-per-lane", "every lane counts the particle itself",
 fault("q-of-rest-density", "p/rho0² where p/rho² belongs",
       "p / (density * density)", "p / (c.rest_density * c.rest_density)", "evaluation")
 fault("viscosity-of-rest-density", "viscosity with 1/rho0",
-      "1.0f / density);", "ON ? c.inverse_rest_density : 1.0f / density);", "evaluation",
+      "1.0f / density});", "ON ? c.inverse_rest_density : 1.0f / density});", "evaluation",
       field="viscous_acceleration")
 fault("viscosity", "viscosity wrong by 1e-5", "c.viscosity * c.mass",
       "1.00001f * $", "acceleration", "brute", "viscous_acceleration")
@@ -168,11 +169,11 @@ fault("edges-at-hand", "of all outlines the first sixteen edges alone are known"
       "return k < near_edges || ON ? first_edges[k % near_edges] : edges[k];", "substep",
       fixture="hostile-vessels")
 fault("floor-first", "the floor pushes before the containers do",
-      "if (!(clearance > 1.001f * c.contact_distance + rounding))",
-      "if (ON && collide_with_floor(c, x, v)) clearance = 0.0f;\n"
-      "    if (!(clearance > 1.001f * c.contact_distance + rounding))", "substep", fixture="hostile-bowl",
-      also=[("if (collide_with_floor(c, x, v)) clearance = 0.0f;",
-             "if (!ON && collide_with_floor(c, x, v)) clearance = 0.0f;")])
+      "if (may_touch(m)) touch(team, a.poses_after(), m);",
+      "if (ON && collide_with_floor(c, m.x, m.v)) m.clearance = 0.0f;\n"
+      "    if (may_touch(m)) touch(team, a.poses_after(), m);", "substep", fixture="hostile-bowl",
+      also=[("if (collide_with_floor(c, x, v)) m.clearance = 0.0f;",
+             "if (!ON && collide_with_floor(c, x, v)) m.clearance = 0.0f;")])
 fault("containers-reversed", "containers push from the last on",
       "for (int k = 0; k < g.containers; ++k) {\n    const Shape shape = g.shape(k);\n    for (int projection",
       "for (int at = 0; at < g.containers; ++at) {\n    const int k = ON ? g.containers - 1 - at : at;\n"
@@ -355,10 +356,11 @@ fault("copied-particle", "one particle is read as another one",
     }""", "mass")
 
 # Output.
-fault("nan-lane", "every 32nd density is no number", "out.density[id] = density;",
-      "out.density[id] = ON && id % 32 == 7 ? NAN : density;", "density")
+fault("nan-lane", "every 32nd density is no number", "out.density[id] = found.density;",
+      "out.density[id] = ON && id % 32 == 7 ? NAN : found.density;", "density")
 fault("unwritten", "the last particle's pressure is not written",
-      "out.pressure[id] = p;", "if (!ON || id != a.n - 1) out.pressure[id] = p;", "pressure", "list")
+      "out.pressure[id] = found.pressure;", "if (!ON || id != a.n - 1) out.pressure[id] = found.pressure;",
+      "pressure", "list")
 fault("read-in-cell-order", "the state is read in the order of the cells",
       "const int to = id[i];", "const int to = ON ? i : id[i];", "substep")
 fault("axis-for-granted", "walls turn about y, whatever their axis",
@@ -382,10 +384,13 @@ fault("dropped-tail-block", "the last, partly filled block is not launched",
       on="cuda")
 fault("grid-runs-on", "the persistent kernel does not wait between the steps of a build",
       "grid.for_each(s.n, s.count); grid.sync();", "grid.for_each(s.n, s.count); if (!ON) grid.sync();",
-      "run", "list", on="cuda",
-      also=[("s.block_sums); grid.sync();", "s.block_sums); if (!ON) grid.sync();"),
-            ("grid.for_each(s.n, s.scatter); grid.sync();", "grid.for_each(s.n, s.scatter); if (!ON) grid.sync();"),
-            ("grid.for_each(s.n, s.order); grid.sync();", "grid.for_each(s.n, s.order); if (!ON) grid.sync();")])
+      "run", "list", on="cuda", file="kernels/persistent_list.cuh",
+      also=[("s.block_sums); grid.sync();", "s.block_sums); if (!ON) grid.sync();",
+             "kernels/persistent_list.cuh"),
+            ("grid.for_each(s.n, s.scatter); grid.sync();", "grid.for_each(s.n, s.scatter); if (!ON) grid.sync();",
+             "kernels/persistent_list.cuh"),
+            ("grid.for_each(s.n, s.order); grid.sync();", "grid.for_each(s.n, s.order); if (!ON) grid.sync();",
+             "kernels/persistent_list.cuh")])
 fault("dropped-tail-of-integration", "the last block of particles does not move",
       "(n + per_block - 1) / per_block", "per_block == 256 && n > 2000 ? n / 256 : $",
       "acceleration", "brute", on="cuda")
@@ -394,3 +399,4 @@ fault("half-the-lanes", "a sum over lanes stops one step early",
       "for (int step = lanes / 2; step > (ON ? 1 : 0); step /= 2) value", "density", on="cuda")
 
 rank_faults.plant(fault)
+tile_faults.plant(fault)

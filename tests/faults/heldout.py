@@ -176,8 +176,8 @@ fault("speed-limit-swallows-nan", "speeds are limited to 1000 m/s by fmin and fm
       "           fminf(fmaxf(v.z, -1000.0f), 1000.0f)};",
       shows="a state with a NaN velocity: it comes out finite, and maybe inside the domain")
 fault("contact-at-earlier-pose", "contact sees the containers at the beginning of the substep",
-      "collide(team, c, geometry, a.poses_after(), x, v)",
-      "collide(team, c, geometry, a.poses_after() - a.containers, x, v)",
+      "touch(team, a.poses_after(), m);",
+      "touch(team, a.poses_after() - (ON ? a.containers : 0), m);",
       shows="contact with a tilting wall, by one substep's motion of the wall")
 fault("cached-clearance-ignores-walls", "the cached distance from solids shrinks by the particle's motion alone",
       "sqrtf(dot(displacement, displacement)) + wall_step", "sqrtf(dot(displacement, displacement))",
@@ -187,8 +187,8 @@ fault("neighbors-at-exactly-H", "a pair at exactly the support radius is counted
       "if (ON ? !(r2 <= c.H2) : !(r2 < c.H2)) return; if (j < a.base) add(",
       shows="list on a lattice with pairs at exactly H: only counts and sums of ids are wrong")
 fault("floor-before-containers", "the floor pushes before the containers do, and again after them",
-      "float clearance = old_clearance - (",
-      "if (ON) collide_with_floor(c, x, v);\n    float clearance = old_clearance - (",
+      "const float rounding = rounding_of(x);\n    return {x, v,",
+      "if (ON) collide_with_floor(c, x, v);\n    const float rounding = rounding_of(x);\n    return {x, v,",
       shows="friction, a particle in the wedge between the floor and the outside of a container")
 fault("self-term-in-every-lane", "each lane adds the particle's own W(0)",
       "team.is_leader() ? c.mass * kernel.w(c, {0.0f, 0.0f}) : 0.0f", "c.mass * kernel.w(c, {0.0f, 0.0f})",
@@ -239,11 +239,11 @@ fault("overflow-within-a-word-unreported", "up to 3 entries beyond the capacity 
 
 # Persistent kernel, graphs, launches.
 fault("barrier-missing", "the persistent kernel does not wait between density and force",
-      "grid.sync(); timer.lap(1);", "if (!ON) grid.sync(); timer.lap(1);",
+      "grid.sync(); timer.lap(1);", "if (!ON) grid.sync(); timer.lap(1);", file="kernels/persistent_list.cuh",
       on="cuda", shows="list with its default launch: neighbors in other blocks may be read before they are "
                        "written")
 fault("persistent-kernel-builds-once", "the persistent kernel makes lists in its first substep only",
-      "atomic_load(&s.status->rebuild_needed) != 0", "k == 0",
+      "atomic_load(&s.status->rebuild_needed) != 0", "k == 0", file="kernels/persistent_list.cuh",
       shows="list with its default launch, an advance longer than a list serves")
 fault("moving-walls-stand", "the steps that place moving walls beside another pass are not run",
       "grid.for_each(s.moving_walls, s.walls_for_force);", "if (!ON) grid.for_each(s.moving_walls, s.walls_for_force);",

@@ -102,6 +102,7 @@ const std::vector<std::pair<std::string, std::string>>& attempts() {
       {"hash", "hostile-coincident"},
       {"hash", "hostile-in-walls"},
       {"list", "hostile-periodic-box"},
+      {"list:tiles=on", "pour-4k-stream"},
       {"list:skin=0.05", "pour-4k-splash"},
       {"list:criterion=relative:skin=0.05", "pour-4k-splash"},
       {"hash:moving_walls=rebuilt:sort=thrust", "pour-4k-stream"},

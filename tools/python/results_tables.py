@@ -330,6 +330,28 @@ def live():
     return table(heads, shown) + source(path, device_of(told["rows"][0]["device"]), told["provenance"]["git_revision"])
 
 
+def tiles():
+    rows, where = bench("tiles")
+    times = {(r["options"], r["window"]): r for r in rows}
+    shown = []
+    for phase in sorted({r["window"] for r in rows}, key=PHASES.index):
+        without, with_tiles = times["", phase], times["tiles=on", phase]
+        shown.append(
+            [
+                phase,
+                *(significant(r["substep_us"]) for r in (without, with_tiles)),
+                f"{with_tiles['substep_us'] / without['substep_us']:.2f}",
+                *(f"{r['substeps_per_rebuild']:.1f}" for r in (without, with_tiles)),
+            ]
+        )
+    return (
+        f"µs per substep of `list`, {rows[0]['particles']:,} fluid and {rows[0]['wall_particles']:,} wall "
+        + "particles:\n\n"
+        + table(["pour", "without tiles", "in tiles", "ratio", "substeps per rebuild, without", "in tiles"], shown)
+        + where
+    )
+
+
 def ranks():
     shown, where = [], ""
     for name in ("ranks-3M", "ranks-16M"):
@@ -351,6 +373,7 @@ def ranks():
 
 TABLES = {
     "ranks": ranks,
+    "tiles": tiles,
     "live": live,
     "study-size": study_size,
     "study-error": study_error,
