@@ -134,7 +134,7 @@ struct MakeTile : TileSet {
         for (int k = 0; k < TileMemory::box_particles; ++k) {
           const int number = b * TileMemory::box_particles + k;
           const Float3 d = xyz(tile.origin[number < own ? number : own - 1]) - x;
-          within |= dot(d, d) < reach2;
+          within |= square_of(d) < reach2;
         }
         if (within) return true;
       }
@@ -173,7 +173,7 @@ struct MakeTile : TileSet {
 #pragma unroll 4
     for (int l = t % lanes; l < end; l += lanes) {
       const Float3 d = x - xyz(tile.position[l]);
-      if (dot(d, d) < reach2 && l != own) body(l);
+      if (square_of(d) < reach2 && l != own) body(l);
     }
   }
   /// List t, in the order of its groups of banks.

@@ -132,6 +132,7 @@ struct IntegrateOwned {
     float4& origin = tile.origin[owned];
     auto moved = integrate.move(x, v, acceleration, origin.w, tile.header->wall_step);
     if (integrate.may_touch(moved)) integrate.touch(team, tile.poses, moved);
+    team.sync();  // all have read the clearance
     if (!team.is_leader()) return;
     integrate.store(tile.index[tile.own[owned]], moved,
                     {origin, sound_skin(tile.header->skin), tile.header->wall_displacement});

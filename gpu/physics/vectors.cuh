@@ -11,6 +11,14 @@ DECANT_DEVICE Float3 operator+(Float3 a, Float3 b) { return {a.x + b.x, a.y + b.
 DECANT_DEVICE Float3 operator-(Float3 a, Float3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 DECANT_DEVICE Float3 operator*(float s, Float3 a) { return {s * a.x, s * a.y, s * a.z}; }
 DECANT_DEVICE float dot(Float3 a, Float3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+/// |a|², rounded the same wherever it stands: a compiler may fuse the products of two copies of a sum differently.
+DECANT_DEVICE float square_of(Float3 a) {
+#ifdef __CUDACC__
+  return __fmaf_rn(a.z, a.z, __fmaf_rn(a.y, a.y, __fmul_rn(a.x, a.x)));
+#else
+  return dot(a, a);
+#endif
+}
 DECANT_DEVICE Float3 cross(Float3 a, Float3 b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }

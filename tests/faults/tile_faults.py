@@ -3,7 +3,7 @@
 
 def plant(fault):
     fault("tile-too-narrow", "a tile holds what is within six tenths of its lists' reach",
-          "within |= dot(d, d) < reach2;", "within |= dot(d, d) < (ON ? 0.36f : 1.0f) * reach2;", "advanced",
+          "within |= square_of(d) < reach2;", "within |= square_of(d) < (ON ? 0.36f : 1.0f) * reach2;", "advanced",
           "list:tiles=on")
     fault("tile-boxes-without-margin", "the boxes around a tile's particles do not reach beyond them",
           "tile.box[b] = {low - outward, high + outward};",
