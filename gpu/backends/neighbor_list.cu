@@ -1,7 +1,7 @@
 /// \file
 /// list: Verlet lists that reach to H and a skin, rebuilt when a pair could be missed (kernels/rebuild_criterion.cuh)
 /// or every N substeps, which the device decides. Below some 300,000 particles all substeps of an advance are one
-/// persistent kernel; below some 15,000 lists are in the shared memory of the multiprocessors, in tiles
+/// persistent kernel; of small scenes, with `tiles`, lists are in the shared memory of the multiprocessors
 /// (kernels/tile_memory.cuh).
 #include "gpu/backends/list_storage.cuh"
 #include "gpu/backends/tile_storage.cuh"
@@ -28,12 +28,12 @@ class NeighborList {
     const bool at_once = o_.launch == SolverOptions::Launch::automatic && !o_.verify && from_cells() &&
                          criterion() != Criterion::relative && !a.on_ranks();
     const bool tiled = at_once && o_.tiles && !c.any_periodic;
-    const double usual = tiled ? widest_of_tiles : widest;
-    widest_skin_ = static_cast<float>(o_.skin < 0 ? usual : o_.skin) * c.H;
+    const double skin = o_.skin >= 0 ? o_.skin : tiled ? widest_of_tiles : widest;
+    widest_skin_ = static_cast<float>(skin) * c.H;
     const float reach = c.H + widest_skin_;
 #ifdef __CUDACC__
     lanes_ = std::min(o_.lanes                  ? o_.lanes
-                      : tiled && fits_tiles(n_) ? TileSet::lanes
+                      : tiled && fits_tiles(n_) ? TileMemory::lanes
                       : n_ < 25000              ? 4
                       : is_large(a.total)       ? 1
                                                 : 2,
@@ -49,16 +49,14 @@ class NeighborList {
       boxes_.resize(2 * static_cast<std::size_t>(table.supers()));
     }
     wall_cells_.prepare(stream, c_, a, walls_, {from_cells(), false, !is_large(a.total), reach}, scratch_);
-    if (!scene_.is(c, a.total, region))
-      lists_.choose_capacity(o_.capacity, 1 + (o_.skin < 0 ? usual : o_.skin), lanes_);
+    if (!scene_.is(c, a.total, region)) lists_.choose_capacity(o_.capacity, 1 + skin, lanes_);
     scene_.set(c, a.total, region);
     lists_.reserve(room_, lanes_);
     persistent_blocks_ = 0;
     tiles_.clear();
     if (!at_once) return;
-    if (tiled && lanes_ == TileSet::lanes && fits_tiles(n_))
-      tiles_.prepare(stream, persistent_tiles_kernel, n_, a.sentinel, a.containers, fluid_.table(),
-                     1 + (o_.skin < 0 ? usual : o_.skin));
+    if (tiled && lanes_ == TileMemory::lanes && fits_tiles(n_))
+      tiles_.prepare(stream, persistent_tiles_kernel, n_, a.sentinel, a.containers, fluid_.table(), 1 + skin);
     if (tiles_.there()) return;
     with_periodic(c_, [&](auto periodic) {
       constexpr bool p = decltype(periodic)::value;
@@ -203,12 +201,7 @@ class NeighborList {
                                   a.status,
                                   walls_.moving<WallsFor::density>(a),
                                   source,
-                                  fluid_.counter(source, scratch_),
-                                  fluid_.counts(),
-                                  fluid_.starts(),
-                                  bucket_bounds(),
-                                  reinterpret_cast<int*>(scratch_.scan.get()),
-                                  fluid_.scatter(source, scratch_),
+                                  sort(source),
                                   order,
                                   TileOrder::rows(fluid_.table()),
                                   fluid_.order(TiledFluidSource{source, order}, scratch_),
@@ -227,12 +220,7 @@ class NeighborList {
                       ListSubstep<periodic>{n_,
                                             walls_.moving_count(),
                                             a.status,
-                                            fluid_.counter(source, scratch_),
-                                            fluid_.counts(),
-                                            fluid_.starts(),
-                                            bucket_bounds(),
-                                            reinterpret_cast<int*>(scratch_.scan.get()),
-                                            fluid_.scatter(source, scratch_),
+                                            sort(source),
                                             fluid_.order(source, scratch_),
                                             list_build<periodic>(a),
                                             {c_, a, listed, {}},
@@ -241,8 +229,15 @@ class NeighborList {
                                             walls_.moving<WallsFor::density>(a)});
   }
 
-  /// Where buckets begin, and where the last one ends.
-  int bucket_bounds() const { return fluid_.table().buckets + 1; }
+  PersistentSort<FluidSource> sort(const FluidSource& source) {
+    return {n_,
+            fluid_.counter(source, scratch_),
+            fluid_.counts(),
+            fluid_.starts(),
+            fluid_.table().buckets + 1,
+            reinterpret_cast<int*>(scratch_.scan.get()),
+            fluid_.scatter(source, scratch_)};
+  }
   FluidSource fluid_source(const ParticleArrays& a, const DeviceGeometry& geometry) const {
     return {c_, a, a.state, a.spare, bucket_.get(), origin_.get(), geometry};
   }

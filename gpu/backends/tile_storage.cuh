@@ -11,7 +11,7 @@ namespace decant::gpu {
 namespace {
 
 /// Whether each of n particles has its threads at once.
-inline bool fits_tiles(int n) { return n <= most_blocks() * (persistent_block / TileSet::lanes); }
+inline bool fits_tiles(int n) { return n <= most_blocks() * (persistent_block / TileMemory::lanes); }
 
 class TileStorage {
  public:
@@ -36,10 +36,10 @@ class TileStorage {
     // A cube of particles dx apart and those within reach of it, H being about 2 dx, walls among them; free surfaces
     // and what is not quite a cube are left to `grow`.
     const double locals = std::pow(std::cbrt(own) + 4 * ratio, 3),
-                 listed = 41 * std::pow(ratio, 3) / TileSet::lanes + 4;
-    const long long wanted = TileMemory::bytes_of(own, TileSet::lanes, static_cast<long long>(locals), 0,
-                                                  static_cast<long long>(std::ceil(listed / 4)),
-                                                  TileMemory::bit_words(sentinel), containers);
+                 listed = 41 * std::pow(ratio, 3) / TileMemory::lanes + 4;
+    const long long wanted =
+        TileMemory::bytes_of(own, static_cast<long long>(locals), 0, static_cast<long long>(std::ceil(listed / 4)),
+                             TileMemory::bit_words(sentinel), containers);
     // All of them are looked through by each block.
     constexpr int most_particles = 32 * persistent_block;
     if (wanted > static_cast<long long>(most_bytes_) || sentinel > most_particles) return;
@@ -78,7 +78,7 @@ class TileStorage {
   /// All, or fewer where each would have less than a warp or two to do: what other threads run is beside it then.
   static int wanted_blocks(int n) {
     constexpr int least_threads = 192;
-    return std::clamp(n * TileSet::lanes / least_threads, 1, most_blocks());
+    return std::clamp(n * TileMemory::lanes / least_threads, 1, most_blocks());
   }
   void reserve() {
 #ifndef __CUDACC__

@@ -151,9 +151,8 @@ struct MakeTile : TileSet {
   DECANT_DEVICE float squared_reach(float reach) const { return reach * reach > c.H2 ? reach * reach : c.H2; }
   /// Whether a tile finds room, as far as it is known; if not the block owns none.
   DECANT_DEVICE bool fits(const PersistentBlock& block, TileHeader& header, int bit_words) const {
-    const long long needed =
-        TileMemory::bytes_of(header.own, lanes, header.locals, header.moving_end - header.moving_begin, header.words,
-                             bit_words, a.containers);
+    const long long needed = TileMemory::bytes_of(header.own, header.locals, header.moving_end - header.moving_begin,
+                                                  header.words, bit_words, a.containers);
     const bool numbered = header.locals < 0xFFFF && header.words <= TileMemory::most_words;
     if (needed <= memory.bytes && numbered) return true;
     block.sync();

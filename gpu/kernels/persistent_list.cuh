@@ -3,10 +3,10 @@
 /// the grid waits; what runs between two waits neither reads nor writes what runs beside it.
 #pragma once
 
-#include "gpu/core/persistent.cuh"
 #include "gpu/kernels/build_list.cuh"
 #include "gpu/kernels/density.cuh"
 #include "gpu/kernels/force.cuh"
+#include "gpu/kernels/persistent_sort.cuh"
 #include "gpu/kernels/sort_sources.cuh"
 
 namespace decant::gpu {
@@ -20,12 +20,7 @@ struct ListSubstep {
   int n, moving_walls;
   DeviceStatus* status;
   // Lists are rebuilt by …
-  CountInCells<FluidSource> count;
-  const int* cell_counts;
-  int* cell_starts;
-  int cells;
-  int* block_sums;
-  ScatterIntoCells<FluidSource> scatter;
+  PersistentSort<FluidSource> sort;
   OrderByIdInCell<FluidSource> order;
   BuildList<periodic> build;
   // … and used by
@@ -43,11 +38,7 @@ persistent_list_kernel(int substeps, const DECANT_GRID_CONSTANT ListSubstep<peri
 #pragma unroll 1
   for (int k = 0; k < substeps; ++k) {
     if (atomic_load(&s.status->rebuild_needed) != 0) {
-      grid.for_each(s.n, s.count);
-      grid.sync();
-      grid.exclusive_scan(s.cell_counts, s.cell_starts, s.cells, s.block_sums);
-      grid.sync();
-      grid.for_each(s.n, s.scatter);
+      s.sort(grid);
       grid.sync();
       grid.for_each(s.n, s.order);
       grid.sync();

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "gpu/kernels/make_tile.cuh"
+#include "gpu/kernels/persistent_sort.cuh"
 #include "gpu/kernels/tiles.cuh"
 
 namespace decant::gpu {
@@ -16,12 +17,7 @@ struct TileSubstep {
   PlaceWalls<WallsFor::density> place_walls;
   FluidSource source;
   // Once an advance particles are sorted by …
-  CountInCells<FluidSource> count;
-  const int* cell_counts;
-  int* cell_starts;
-  int cells;
-  int* block_sums;
-  ScatterIntoCells<FluidSource> scatter;
+  PersistentSort<FluidSource> sort;
   TileOrder order_of_tiles;
   int rows;
   OrderByIdInCell<TiledFluidSource> order;
@@ -32,14 +28,10 @@ struct TileSubstep {
 
 /// Who owns what. Particles are in `source.into` then, and where lists will have them is known.
 DECANT_DEVICE void sort_into_tiles(const PersistentGrid& grid, const TileSubstep& s) {
-  grid.for_each(s.n, s.count);
-  grid.sync();
-  grid.exclusive_scan(s.cell_counts, s.cell_starts, s.cells, s.block_sums);
-  grid.sync();
-  grid.for_each(s.n, s.scatter);
+  s.sort(grid);
   grid.for_each(s.rows, [&](int k) DECANT_INLINE { s.order_of_tiles.count_in(k); });
   grid.sync();
-  grid.exclusive_scan(s.order_of_tiles.count, s.order_of_tiles.start, s.rows, s.block_sums);
+  grid.exclusive_scan(s.order_of_tiles.count, s.order_of_tiles.start, s.rows, s.sort.block_sums);
   grid.sync();
   grid.for_each(s.n, s.order);
   grid.sync();

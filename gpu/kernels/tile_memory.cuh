@@ -25,7 +25,7 @@ struct TileOrder {
   static constexpr int row = 8;  // cells
 
   CellTable table;
-  int* count;     // [rows() + padding], particles by row
+  int* count;     // [rows()], particles by row
   int* start;     // … and before it
   int* particle;  // [n], in this order
 
@@ -82,6 +82,12 @@ struct TileHeader {
 
 /// A block's memory. While the tile is made, bits for all particles of the scene are where positions are later.
 struct TileMemory {
+  /// Threads per particle.
+#ifdef __CUDACC__
+  static constexpr int lanes = 8;
+#else
+  static constexpr int lanes = 1;
+#endif
   static constexpr int header_bytes = 64;
   static constexpr int most_words = 63;  // so that numbers of entries fit in eight bits
   static constexpr int box_particles = 8;
@@ -99,8 +105,7 @@ struct TileMemory {
   unsigned long long* count;    // of a thread's entries, by group of banks, eight bits each
   unsigned short* length;       // of a thread's list, in words
 
-  DECANT_DEVICE TileMemory(char* memory, int bytes, int lanes, int containers)
-      : header(reinterpret_cast<TileHeader*>(memory)) {
+  DECANT_DEVICE TileMemory(char* memory, int bytes, int containers) : header(reinterpret_cast<TileHeader*>(memory)) {
     const int locals = header->locals, particles = header->own;
     threads = particles * lanes;
     poses = reinterpret_cast<DevicePose*>(memory + header_bytes);
@@ -120,8 +125,8 @@ struct TileMemory {
     list = reinterpret_cast<uint2*>(memory + at / 8 * 8) - header->words * threads;
   }
   /// Bytes that a tile needs, while it is made and afterwards.
-  DECANT_BOTH static long long bytes_of(long long own, long long lanes, long long locals, long long moving,
-                                        long long words, int bit_words, int containers) {
+  DECANT_BOTH static long long bytes_of(long long own, long long locals, long long moving, long long words,
+                                        int bit_words, int containers) {
     const long long marks = 6LL * bit_words, state = 32 * locals;
     return header_bytes + pose_bytes(containers) + 16 * (own + moving) + (marks > state ? marks : state) + 4 * locals +
            box_bytes(static_cast<int>(own)) + 8 * (words + 1) * own * lanes + 2 * (own + own * lanes) + 16;
@@ -150,12 +155,7 @@ struct IndexRanks {
 
 /// The tiles of a scene.
 struct TileSet {
-  /// Threads per particle.
-#ifdef __CUDACC__
-  static constexpr int lanes = 8;
-#else
-  static constexpr int lanes = 1;
-#endif
+  static constexpr int lanes = TileMemory::lanes;
 
   Constants c;
   ParticleArrays a;
@@ -168,7 +168,7 @@ struct TileSet {
   BlockMemory memory;
 
   DECANT_DEVICE TileMemory of(const PersistentBlock& block) const {
-    return {block.memory(), memory.bytes, lanes, a.containers};
+    return {block.memory(), memory.bytes, a.containers};
   }
   /// The particles of a block are particle[first_of(block)] on.
   DECANT_DEVICE int first_of(int block) const {
