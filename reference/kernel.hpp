@@ -80,6 +80,9 @@ class Kernel {
     return 2 * r * r * G / (r * r + Real(0.01) * h_ * h_);
   }
 
+  /// The constant that G and L are multiples of, 1/m⁵; mueller2003: 1/m⁶.
+  Real norm_G() const { return g_; }
+
   /// |W'(r)|, 1/m⁴.
   Real slope_W(Real r) const {
     if (family_ != KernelFamily::mueller2003) return r * G(r);

@@ -39,7 +39,8 @@ std::map<std::string, std::string> choices(const Forms& f) {
                         {"image", {"of difference", "ghost"}, at(f.image)},
                         {"quotient", {"divided", "by inverse"}, at(f.quotient)},
                         {"factor", {"in terms", "after sum"}, at(f.factor)},
-                        {"fused", {"no", "yes"}, f.fused}};
+                        {"fused", {"no", "yes"}, f.fused},
+                        {"underflow", {"gradual", "to zero"}, f.flushed}};
   std::map<std::string, std::string> names;
   for (const Choice& c : all) names[c.name] = c.values[c.chosen];
   return names;
@@ -62,7 +63,9 @@ Forms random_forms(std::mt19937& random) {
   pick(f.image, 2);
   pick(f.quotient, 2);
   pick(f.factor, 2);
-  f.fused = std::uniform_int_distribution<int>(0, 1)(random) == 1;
+  const auto yes = [&] { return std::uniform_int_distribution<int>(0, 1)(random) == 1; };
+  f.fused = yes();
+  f.flushed = yes();
   return f;
 }
 
@@ -136,6 +139,8 @@ Fixture random_form_case(std::uint32_t seed) {
     f.state.position.col(i) = x[static_cast<std::size_t>(i)];
     f.state.velocity.col(i) = drift + spread * vector(1);
   }
+  if (chance(0.15))  // as what is left of one by a wall's rotated normal
+    for (Eigen::Index c = 0; c < 3; ++c) f.state.velocity.row(c) *= std::exp2(real(-149, -60));
   f.state.quantise();
   scene.domain = {corner - Vec3::Constant(50), corner + Vec3::Constant(50), {}};
   if (periodic >= 0) {

@@ -12,6 +12,9 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#ifdef __SSE2__
+#include <xmmintrin.h>
+#endif
 
 namespace decant::test {
 namespace {
@@ -253,6 +256,28 @@ void place(const Forms& f, const Scene& scene, const Walls& walls, double time, 
   }
 }
 
+/// While it lives, numbers below 2⁻¹²⁶ are 0 as operands and as results.
+class FlushToZero {
+ public:
+  explicit FlushToZero([[maybe_unused]] bool flushed) {
+#ifdef __SSE2__
+    if (flushed) _mm_setcsr(before_ | 0x8040);  // FTZ, DAZ
+#endif
+  }
+  FlushToZero(const FlushToZero&) = delete;
+  FlushToZero& operator=(const FlushToZero&) = delete;
+  ~FlushToZero() {
+#ifdef __SSE2__
+    _mm_setcsr(before_);
+#endif
+  }
+
+ private:
+#ifdef __SSE2__
+  unsigned before_ = _mm_getcsr();
+#endif
+};
+
 }  // namespace
 
 Fields evaluate_by(const Forms& forms, const Scene& scene, const Walls& walls, const ParticleState& state,
@@ -262,6 +287,7 @@ Fields evaluate_by(const Forms& forms, const Scene& scene, const Walls& walls, c
   Neighbors near;
   find_neighbors(scene, state.position, pose_walls(scene, walls, time).position, NeighborSearch::cells, near);
   const WallNeighbors wall_near = find_wall_neighbors(scene, walls);
+  const FlushToZero mode(forms.flushed);
   std::vector<F3> wall, wall_v;
   place(forms, scene, walls, time, wall, wall_v);
   const auto n = static_cast<std::size_t>(state.size());

@@ -27,6 +27,7 @@ struct Forms {
   enum class Quotient { divided, by_inverse } quotient = Quotient::divided;  // r/h, rho/rho0, p/rho²
   enum class Factor { in_terms, after_sum } factor = Factor::in_terms;       // of viscosity and density
   bool fused = false;                                                        // sums by fused multiply-add
+  bool flushed = false;                                                      // below 2⁻¹²⁶ is 0, where the host can
 };
 
 /// Every choice by its name: "order": "pairwise", …
@@ -39,7 +40,8 @@ Fields evaluate_by(const Forms& forms, const Scene& scene, const Walls& walls, c
                    const StageInputs* given = nullptr);
 
 /// A few hundred particles that no pour would show: lattices, exact and perturbed by any amount, and
-/// clouds, free and in tanks at rest and tilting about pivots up to 20 m away, H = 2 to 4 dx.
+/// clouds, free and in tanks at rest and tilting about pivots up to 20 m away, H = 2 to 4 dx, with velocities down to
+/// the least that fp32 has.
 Fixture random_form_case(std::uint32_t seed);
 
 /// Largest |error| / tolerance of each real field.

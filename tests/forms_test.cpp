@@ -5,6 +5,7 @@
 #include "oracle/files/fixture_file.hpp"
 
 #include "reference/sampling.hpp"
+#include "reference/shapes.hpp"
 
 #include <gtest/gtest.h>
 
@@ -87,6 +88,46 @@ TEST(LegalForms, MayStartASumFromGravityWhereTermsAreManyAndEqual) {
       problem.expect_within(forms);
     }
   }
+}
+
+/// Drag too small for fp32, in every digit or in none: what rests but for a last place of a rotated normal.
+TEST(LegalForms, MayTakeForZeroWhatUnderflows) {
+  Fixture f = test::random_form_case(1);
+  Scene& scene = f.scene;
+  const double dx = scene.particle_spacing = 0.004;
+  scene.fluid.viscosity = 0.05;
+  scene.fluid.wall_viscosity = 0.1;
+  scene.containers = {{"tank", tank_shape(Vec3::Constant(5 * dx), 3 * dx, {}), Vec3::Zero(), 3 * dx, {}}};
+  scene.domain = {Vec3::Constant(-1), Vec3::Constant(1), {}};
+  f.state.position.resize(3, 27);
+  for (Eigen::Index i = 0; i < 27; ++i)
+    f.state.position.col(i) =
+        dx * (Vec3(static_cast<double>(i % 3), static_cast<double>(i / 3 % 3), static_cast<double>(i / 9)) +
+              Vec3::Constant(0.5));
+  f.state.substep = 0;
+  bool lost = false;
+  for (int exponent = -149; exponent <= -100; ++exponent) {
+    f.state.velocity = Eigen::Matrix3Xd::Constant(3, 27, std::exp2(exponent));
+    f.state.quantise();
+    const Problem problem(f);
+    Forms forms;
+    for (const bool flushed : {false, true})
+      for (const auto factor : {Forms::Factor::in_terms, Forms::Factor::after_sum}) {
+        forms.flushed = flushed;
+        forms.factor = factor;
+        problem.expect_within(forms);
+      }
+    const Fields got = test::evaluate_by(forms, scene, problem.walls, f.state, nullptr);
+    lost = lost || (got.wall_viscous_acceleration.isZero(0) && !problem.own.fields.wall_viscous_acceleration.isZero(0));
+  }
+  EXPECT_TRUE(lost) << "no form takes anything for 0";
+}
+
+TEST(LegalForms, AreNotAllowedUnderflowWhereThereIsNone) {
+  const Problem problem(read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-filling.h5"));
+  Fields got = problem.given.fields;
+  got.wall_viscous_acceleration.setZero();
+  EXPECT_GT(test::scores(got, problem.given).at("wall_viscous_acceleration"), 1e3);
 }
 
 TEST(LegalForms, AreNotWhatFaultsHideBehind) {

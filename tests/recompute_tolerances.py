@@ -14,6 +14,7 @@ import h5py
 import numpy as np
 
 u = 2.0 ** -24 + 2.0 ** -53
+N = 2.0 ** -126
 SUMMED = ("pressure", "viscous", "wall_pressure", "wall_viscous")
 
 
@@ -38,10 +39,10 @@ def kernel(name, H):
         G = lambda r: np.where(r > 0, g * (H - r) ** 2 / safe(r), 0)
         dG = lambda r: np.where(r > 0, g * (((H - r) / safe(r)) ** 2 + 2 * (H - r) / safe(r)), 0)
         return W, G, lambda r: g * (H - r), lambda r: 6 * w * r * (H * H - r * r) ** 2, dG, \
-            lambda r: g + 0 * r
+            lambda r: g + 0 * r, g
     soft = 0.01 * h * h
     return W, G, lambda r: 2 * r * r * G(r) / (r * r + soft), lambda r: r * G(r), dG, \
-        lambda r: 2 * (r * r * dG(r) * (r * r + soft) + 2 * r * G(r) * soft) / (r * r + soft) ** 2
+        lambda r: 2 * (r * r * dG(r) * (r * r + soft) + 2 * r * G(r) * soft) / (r * r + soft) ** 2, g
 
 
 def S(terms, inside):
@@ -57,10 +58,20 @@ def S(terms, inside):
     return E1 + inside if E1 <= E2 else max(min(E1, 3 * E2), E2 + inside)
 
 
+def lost(terms, factors, y, by_y):
+    """F: of terms with a component y, what underflow may take. by_y: |t/y|."""
+    smallest = np.minimum(np.abs(y), 1)
+    for f in factors:
+        smallest = smallest * np.minimum(np.abs(f) * np.ones(len(y)), 1)[:, None]
+    F = np.where(smallest < 2.0 ** 20 * N, np.abs(terms), 0) + 2 * N * (1 + by_y[:, None])
+    return np.where(terms != 0, F, 0)
+
+
 class Pairs:
     """x_ij, r and error of pairs nearer than H, and those near H."""
 
-    def __init__(self, x, y, period, H, exact, same, error=None):
+    def __init__(self, x, y, domain, H, exact, same, error=None):
+        low, high, period = domain
         i, j = np.indices((len(x), len(y))).reshape(2, -1)
         keep = np.abs(x[i] - y[j]).max(axis=1) < 1.1 * H if not period.any() else slice(None)
         i, j = i[keep], j[keep]
@@ -74,7 +85,8 @@ class Pairs:
         i, j, d, x_ij, r = i[keep], j[keep], d[keep], d_near[keep], r[keep]
         turned = np.abs(d - x_ij)
         e = u * H * ((np.abs(x[i]) < H) * 1.0 + (np.abs(y[j]) < H))
-        e = e + np.where(turned > 0, u * (3 * turned + np.abs(x[i]) + np.abs(x_ij)), 0)
+        ends = 3 + (np.abs(low) + np.abs(high)) / L
+        e = e + np.where(turned > 0, u * (turned * ends + np.abs(x[i]) + np.abs(x_ij)), 0)
         if error is not None:
             e = e + error[j]
         delta = 8 * u * H + np.sqrt((e ** 2).sum(axis=1))
@@ -118,7 +130,7 @@ class Oracle:
         self.H, self.m, self.rho0 = s["support_radius"], s["particle_mass"], s["rest_density"]
         name = s["kernel"].decode()
         self.k_W, self.k_G = (11, 8) if name == "mueller2003" else (5, 7)
-        self.W, self.G, self.L, self.dW, self.dG, self.dL = kernel(name, self.H)
+        self.W, self.G, self.L, self.dW, self.dG, self.dL, self.n_G = kernel(name, self.H)
         get = lambda path: file[path][:].astype(np.float64)
         self.x, self.v, self.g = get("state/position"), get("state/velocity"), get("scene/gravity")
         low, high = get("scene/domain_min"), get("scene/domain_max")
@@ -128,9 +140,10 @@ class Oracle:
         self.pose_errors(file, json.loads(file["scene/json"][()]))
         grid = 2.0 ** (np.floor(np.log2(self.H)) - 10)
         exact = not period.any() and not (self.x % grid).any() and self.H % grid == 0
-        self.fluid = Pairs(self.x, self.x, period, self.H, exact, True)
-        self.wall = Pairs(self.x, self.xw, period, self.H, False, False, self.e_b)
-        self.volumes(period)
+        domain = low, high, period
+        self.fluid = Pairs(self.x, self.x, domain, self.H, exact, True)
+        self.wall = Pairs(self.x, self.xw, domain, self.H, False, False, self.e_b)
+        self.volumes(domain)
         self.density()
         self.staged = get("staged/density"), get("staged/pressure")
 
@@ -150,12 +163,12 @@ class Oracle:
         self.dv_b = 4 * u * cross_size(w, lever) + cross_size(w, self.e_b + u * np.abs(p)) + \
             u * np.abs(self.vw) + 2 * u * (np.abs(pose["linear_velocity"]) + np.abs(pose["surface_velocity"]))
 
-    def volumes(self, period):
+    def volumes(self, domain):
         M = len(self.local)
         self.V, self.tau_V = np.zeros(M), np.zeros(M)
         for c in np.unique(self.owner):
             own = np.flatnonzero(self.owner == c)
-            p = Pairs(self.local[own], self.local[own], period, self.H, True, True)
+            p = Pairs(self.local[own], self.local[own], domain, self.H, True, True)
             n, W0 = len(own), self.W(np.zeros(1))
             W, dW = self.W(p.r), self.dW(p.r)
             I = u * ((7 + self.k_W) * (W0 + total(n, p.i, W)) + 6.5 * total(n, p.i, p.r * dW) +
@@ -216,14 +229,17 @@ class Oracle:
         x, xw = np.abs(f.x), np.abs(w.x)
         t, I, rest, grad, sq = {}, {}, {}, {}, {}
 
-        def part(name, pairs, terms, inside, pose, inputs, common):
+        def part(name, pairs, terms, inside, pose, inputs, common, factors, by_y, y):
             t[name] = pairs.i, terms
             I[name] = u * total(n, pairs.i, inside) + common * u * np.abs(total(n, pairs.i, terms))
-            rest[name] = total(n, pairs.i, pose + inputs)
+            K = self.n_G * np.ones(len(pairs.i))
+            F = lost(terms, [*factors[:-1], K, factors[-1] / K], y, by_y)
+            rest[name] = total(n, pairs.i, pose + inputs + F)
             grad[name] = sq[name] = np.zeros((n, 3))
         A = m * (np.abs(q[f.i]) + np.abs(q[f.j]))
         part("pressure", f, col(m * (q[f.i] + q[f.j]) * G) * f.x, col(A * (12 * G + 7.5 * f.r * dG)) * x,
-             col(A * G) * f.e + col(A * dG * f.along) * x, 0 * x, self.k_G + 9)
+             col(A * G) * f.e + col(A * dG * f.along) * x, 0 * x, self.k_G + 9,
+             [m, np.abs(q[f.i]) + np.abs(q[f.j]), G], A * G, f.x)
         grad["pressure"] = total(n, f.i, col(m * G) * f.x)
         sq["pressure"] = total(n, f.i, (col(m * tau_q[f.j] * G) * x) ** 2)
         for s in in_common:
@@ -234,20 +250,21 @@ class Oracle:
         rel = tau_rho / rho
         part("viscous", f, col(A * L) * dv, col(A * (16 * L + 7.5 * f.r * dL)) * np.abs(dv),
              col(A * dL * f.along) * np.abs(dv), col((rel[f.i] + rel[f.j]) * A * L) * np.abs(dv),
-             self.k_G + 9)
+             self.k_G + 9, [mu, m, 1 / rho[f.i], 1 / rho[f.j], L], A * L, dv)
         rest["viscous"] += total(n, i, col(mu / rho[i] * m / rho[j] * self.L(r)) *
                                  np.abs(self.v[j] - self.v[i]))
         A = rho0 * V[w.j] * np.abs(q[w.i])
         part("wall_pressure", w, col(rho0 * V[w.j] * q[w.i] * Gw) * w.x,
              col(A * (14 * Gw + 7.5 * w.r * dGw)) * xw, col(A * Gw) * w.e + col(A * dGw * w.along) * xw,
-             col(A * self.tau_V[w.j] / V[w.j] * Gw) * xw, self.k_G + 5)
+             col(A * self.tau_V[w.j] / V[w.j] * Gw) * xw, self.k_G + 5, [rho0, V[w.j], q[w.i], Gw], A * Gw, w.x)
         grad["wall_pressure"] = total(n, w.i, col(rho0 * V[w.j] * Gw) * w.x)
         i, b, xn, r = w.near
         rest["wall_pressure"] += total(n, i, col(rho0 * V[b] * np.abs(q[i]) * self.G(r)) * np.abs(xn))
         dv, A = self.vw[w.j] - self.v[w.i], mu_w * V[w.j] / rho[w.i]
         part("wall_viscous", w, col(A * Lw) * dv, col(A * (18 * Lw + 7.5 * w.r * dLw)) * np.abs(dv),
              col(A * dLw * w.along) * np.abs(dv) + col(A * Lw) * self.dv_b[w.j],
-             col((rel[w.i] + self.tau_V[w.j] / V[w.j]) * A * Lw) * np.abs(dv), self.k_G + 5)
+             col((rel[w.i] + self.tau_V[w.j] / V[w.j]) * A * Lw) * np.abs(dv), self.k_G + 5,
+             [mu_w, 1 / rho[w.i], V[w.j], Lw], A * Lw, dv)
         rest["wall_viscous"] += total(n, i, col(mu_w * V[b] / rho[i] * self.L(r)) *
                                       np.abs(self.vw[b] - self.v[i]))
 

@@ -12,6 +12,8 @@ namespace decant {
 namespace {
 
 constexpr double u = unit_roundoff;
+/// What underflow takes from two inputs or products, and their sum.
+const Vec3 underflow = Vec3::Constant(3 * smallest_normal);
 
 /// A normal that may turn by more, rad, is ambiguous.
 constexpr double most_turn = 0.1;
@@ -91,7 +93,7 @@ std::vector<Pose> ContactBounds::poses_at(double time) const {
 
 void ContactBounds::accelerate(const Vec3& a, const Vec3& tau_a, BoundedParticle& p) const {
   const double dt = scene_.time_step();
-  p.tau_v.add(dt * tau_a + 2 * u * (p.v.cwiseAbs() + dt * a.cwiseAbs()));
+  p.tau_v.add(dt * tau_a + 2 * u * (p.v.cwiseAbs() + dt * a.cwiseAbs()) + underflow);
   p.v += dt * a;
 }
 
@@ -99,7 +101,7 @@ void ContactBounds::fly(BoundedParticle& p) const {
   const double dt = scene_.time_step();
   p.tau_x.components += dt * p.tau_v.components;
   p.tau_x.length += dt * p.tau_v.length;
-  p.tau_x.add(u * (2 * p.x.cwiseAbs() + 4 * dt * p.v.cwiseAbs()));
+  p.tau_x.add(u * (2 * p.x.cwiseAbs() + 4 * dt * p.v.cwiseAbs()) + underflow);
   p.x += dt * p.v;
   for (int c = 0; c < 3; ++c) {
     if (!scene_.domain.periodic[static_cast<std::size_t>(c)]) continue;

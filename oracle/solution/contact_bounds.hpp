@@ -86,9 +86,9 @@ class ContactBounds {
  public:
   explicit ContactBounds(const Scene& scene);
 
-  /// v += dt a. \param tau_a  m/s²
+  /// v += dt a: tau_v += dt tau_a + 2u (|v| + dt|a|) + 3N, N = 2⁻¹²⁶. \param tau_a  m/s²
   void accelerate(const Vec3& a, const Vec3& tau_a, BoundedParticle& p) const;
-  /// x += dt v, and back into the period: tau_x += dt tau_v + u (2|x| + 4 dt|v|).
+  /// x += dt v, and back into the period: tau_x += dt tau_v + u (2|x| + 4 dt|v|) + 3N.
   void fly(BoundedParticle& p) const;
   /// Containers, where they stand, in the scene's order, and then the floor.
   /// \param poses  one a container

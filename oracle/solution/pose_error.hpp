@@ -41,19 +41,27 @@ PoseErrors pose_errors(const Scene& scene, const Walls& walls, const PosedWalls&
 ///
 ///   u H for each of the two with |x_c| < H: a frame relative to the center of a cell, up to 2 H wide and a
 ///     power of two, is exact but in the cells at 0, whose places have finer grids than what is left of them;
-///   u (3 |k L| + |x_i,c| + |x_ij,c|) where the nearest image is k ≠ 0 periods away: L is rounded, or x_j moved
-///     by it.
+///   u (3 |k L| + |k| (|low_c| + |high_c|) + |x_i,c| + |x_ij,c|) where the nearest image is k ≠ 0 periods away: L is
+///     rounded, or the difference of the rounded ends of the domain, and x_j may be moved by it.
 ///
 /// \param x_ij  by the nearest image; \param H  support radius, m
-inline Vec3 pair_error(const Vec3& x_i, const Vec3& x_j, const Vec3& x_ij, double H, double u) {
+inline Vec3 pair_error(const Vec3& x_i, const Vec3& x_j, const Vec3& x_ij, const Domain& domain, double H, double u) {
   Vec3 e;
   for (int c = 0; c < 3; ++c) {
     e[c] = u * H * ((std::abs(x_i[c]) < H ? 1 : 0) + (std::abs(x_j[c]) < H ? 1 : 0));
-    const double periods = std::abs(x_i[c] - x_j[c] - x_ij[c]);
+    const double way = std::abs(x_i[c] - x_j[c] - x_ij[c]);
     // Without a period the difference is the same bit for bit.
-    if (periods > 0) e[c] += u * (3 * periods + std::abs(x_i[c]) + std::abs(x_ij[c]));
+    if (way == 0) continue;
+    const double low = domain.min[c], high = domain.max[c];
+    e[c] += u * (way * (3 + (std::abs(low) + std::abs(high)) / (high - low)) + std::abs(x_i[c]) + std::abs(x_ij[c]));
   }
   return e;
+}
+
+/// How far r = |x| is off where its components are off by e: e · |x|/|x|, m.
+inline double error_along(const Vec3& x, double r, const Vec3& e) {
+  if (e.x() == 0 && e.y() == 0 && e.z() == 0) return 0;
+  return r > 0 ? x.cwiseAbs().dot(e) / r : e.norm();
 }
 
 }  // namespace decant

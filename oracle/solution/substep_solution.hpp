@@ -31,8 +31,8 @@ struct SubstepSolution {
   double longest_push = 0;
 };
 
-/// tau_v = dt tau_a + 2u (|v| + dt|a|), tau_x = dt tau_v + u (2|x| + 4 dt|v|), and what contacts make of
-/// them (contact_bounds.hpp).
+/// tau_v = dt tau_a + 2u (|v| + dt|a|) + 3N, tau_x = dt tau_v + u (2|x| + 4 dt|v|) + 3N, N = 2⁻¹²⁶, and what contacts
+/// make of them (contact_bounds.hpp).
 /// \param fields  the oracle's answer at `state`
 SubstepSolution substep_solution(const Scene& scene, const ParticleState& state, const ReferenceSolution& fields);
 

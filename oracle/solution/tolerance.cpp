@@ -1,6 +1,6 @@
 /// \file
-/// One pass for boundary volumes, one for density and pressure, one for accelerations, each beside
-/// the oracle's own; the passes mirror the formulas in tolerance.hpp.
+/// One pass for density and pressure, one for accelerations, each beside the oracle's own; the passes mirror the
+/// formulas in tolerance.hpp.
 #include "oracle/solution/tolerance.hpp"
 
 #include "oracle/solution/force_bounds.hpp"
@@ -21,38 +21,6 @@ namespace decant {
 namespace {
 
 constexpr double u = both_roundoffs;
-
-/// How far r = |x| is off where its components are off by e: e · |x|/|x|, m.
-double along(const Vec3& x, double r, const Vec3& e) {
-  if (e.x() == 0 && e.y() == 0 && e.z() == 0) return 0;
-  return r > 0 ? x.cwiseAbs().dot(e) / r : e.norm();
-}
-
-Eigen::VectorXd volume_tolerances(const Scene& scene, const WallNeighbors& neighbors, const Eigen::VectorXd& volumes) {
-  const Kernel<double> kernel(scene.kernel, scene.support_radius());
-  const Separation separation(scene.domain);
-  const double H = scene.support_radius();
-  const double own = of_density_term - 1 + CommonRoundings(scene.kernel).W;  // no mass
-  const Eigen::Matrix3Xd& x = neighbors.position;
-  Eigen::VectorXd tolerance(x.cols());
-  SumBound sum;
-  CellCounter cells;
-  for (Eigen::Index b = 0; b < x.cols(); ++b) {
-    const auto& near = neighbors.near[static_cast<std::size_t>(b)];
-    sum.clear();
-    sum.add(kernel.W(0));
-    double inside = own * kernel.W(0), by_H = -3 * kernel.W(0);
-    for (const auto k : near) {
-      const Vec3 x_b = x.col(b), x_k = x.col(k), x_bk = separation(x_b, x_k);
-      const double r = x_bk.norm(), W = kernel.W(r), slope = kernel.slope_W(r);
-      sum.add(W);
-      by_H += r * slope - 3 * W;
-      inside += own * W + of_distance * r * slope + slope * along(x_bk, r, pair_error(x_b, x_k, x_bk, H, 1.0));
-    }
-    tolerance[b] = volumes[b] * volumes[b] * sum.error(u, u * (inside + std::abs(by_H)), cells) + 2 * u * volumes[b];
-  }
-  return tolerance;
-}
 
 }  // namespace
 
@@ -162,8 +130,8 @@ class ReferenceAt::Bounds {
         inside += own * t + of_distance * r * slope;
         by_H += r * slope - 3 * t;
         pose += slope * image_magnitude(x_i, x_j, x_ij);
-        const Vec3 e = pair_error(x_i, x_j, x_ij, H_, u);
-        misplaced += slope * along(x_ij, r, e);
+        const Vec3 e = pair_error(x_i, x_j, x_ij, scene_.domain, H_, u);
+        misplaced += slope * error_along(x_ij, r, e);
         if (periodic_ && r > 0) add_images(x_i - x_j, x_ij, slope / r * e, images);
         ambiguous_fluid[i] += 6 * margin(e) / H_;
       }
@@ -177,7 +145,7 @@ class ReferenceAt::Bounds {
         by_H += r * slope - 3 * t;
         pose += slope * std::max(pose_.largest[b], image_magnitude(x_i, x_b, x_ib));
         const Vec3 e = wall_error(b, x_i, x_b, x_ib);
-        misplaced += slope * along(x_ib, r, e);
+        misplaced += slope * error_along(x_ib, r, e);
         ambiguous_wall[i] += 6 * margin(e) / H_;
         if (r > 0) displaced += slope / r * x_ib.cwiseProduct(e);
         if (periodic_ && r > 0) add_images(x_i - x_b, x_ib, slope / r * e, images);
@@ -228,7 +196,7 @@ class ReferenceAt::Bounds {
 
   /// Error of x_i − x_b, by component, m.
   Vec3 wall_error(Eigen::Index b, const Vec3& x_i, const Vec3& x_b, const Vec3& x_ib) const {
-    return pose_.position.col(b) + pair_error(x_i, x_b, x_ib, H_, u);
+    return pose_.position.col(b) + pair_error(x_i, x_b, x_ib, scene_.domain, H_, u);
   }
 
   void accelerations() {
@@ -270,6 +238,11 @@ class ReferenceAt::Bounds {
     });
   }
 
+  /// Factors of G or L, whose norm a port may multiply first or last.
+  double least_of(double kernel_value) const {
+    return least(kernel_.norm_G()) * least(kernel_value / kernel_.norm_G());
+  }
+
   void fluid_bounds(Eigen::Index i, const std::vector<std::int32_t>& ids, ForceBounds& pressure,
                     ForceBounds& viscous) const {
     const double m = scene_.particle_mass(), mu = scene_.fluid.viscosity;
@@ -283,14 +256,15 @@ class ReferenceAt::Bounds {
       const double r = x_ij.norm(), G = kernel_.G(r), dG = kernel_.slope_G(r);
       const Vec3 x = x_ij.cwiseAbs();
       const double q_j = q_[j], A = m * (std::abs(q_i) + std::abs(q_j));
-      const Vec3 e = pair_error(x_i, x_j, x_ij, H_, u);
-      const double e_r = along(x_ij, r, e);
+      const Vec3 e = pair_error(x_i, x_j, x_ij, scene_.domain, H_, u);
+      const double e_r = error_along(x_ij, r, e);
       pressure.add(m * (q_i + q_j) * G * x_ij);
       pressure.condition += m * std::abs(q_i + q_j) * (G + r * dG) * x;
       pressure.inside += A * (own * G + of_distance_and_H * r * dG) * x;
       pressure.pose += A * (G * e + dG * e_r * x);
       pressure.squares += (m * tau_q_[j] * G * x).cwiseAbs2();
       pressure.gradient += m * G * x_ij;
+      pressure.underflow(m * (q_i + q_j) * G * x_ij, least(m) * least(A / m) * least_of(G), x_ij, A * G);
       in_common += m * G * x_ij * (in_common_q_.col(i).head<5>() + in_common_q_.col(j).head<5>()).transpose();
       if (periodic_)
         by_images += m * G * x_ij * (in_common_q_.col(i).tail<6>() + in_common_q_.col(j).tail<6>()).transpose();
@@ -302,6 +276,8 @@ class ReferenceAt::Bounds {
       viscous.inside += D * (own_viscous * L + of_distance_and_H * r * dL) * dv;
       viscous.pose += D * dL * e_r * dv;
       viscous.inputs += D * L * (rho_off_[i] + rho_off_[j]) * dv;
+      viscous.underflow(D * L * v_ji, least(mu) * least(m) * least(1 / rho_[i]) * least(1 / rho_[j]) * least_of(L),
+                        v_ji, D * L);
     }
     pressure.inputs += in_common.cwiseAbs().rowwise().sum() + by_images.cwiseAbs().rowwise().sum();
     for (const Edge& e : edge_fluid_[static_cast<std::size_t>(i)]) {
@@ -324,7 +300,7 @@ class ReferenceAt::Bounds {
       const double r = x_ib.norm(), G = kernel_.G(r), dG = kernel_.slope_G(r);
       const Vec3 x = x_ib.cwiseAbs();
       const Vec3 e = wall_error(b, x_i, x_b, x_ib);
-      const double e_r = along(x_ib, r, e);
+      const double e_r = error_along(x_ib, r, e);
       const double tau_V = solution_.tolerance.boundary_volume[b];
       const double A = rho0 * V[b] * std::abs(q_[i]);
       pressure.add(rho0 * V[b] * q_[i] * G * x_ib);
@@ -333,6 +309,8 @@ class ReferenceAt::Bounds {
       pressure.pose += A * (G * e + dG * e_r * x);
       pressure.inputs += A / V[b] * tau_V * G * x;
       pressure.gradient += rho0 * V[b] * G * x_ib;
+      pressure.underflow(rho0 * V[b] * q_[i] * G * x_ib,
+                         least(rho0) * least(V[b]) * least(std::abs(q_[i])) * least_of(G), x_ib, A * G);
       const Vec3 v_bi = posed_.velocity.col(b) - v_i, dv = v_bi.cwiseAbs();
       const double D = mu_w / rho_[i] * V[b], L = kernel_.L(r), dL = kernel_.slope_L(r);
       viscous.add(D * L * v_bi);
@@ -340,6 +318,7 @@ class ReferenceAt::Bounds {
       viscous.inside += D * (own_viscous * L + of_distance_and_H * r * dL) * dv;
       viscous.pose += D * (dL * e_r * dv + L * pose_.velocity.col(b));
       viscous.inputs += D * L * (rho_off_[i] + tau_V / V[b]) * dv;
+      viscous.underflow(D * L * v_bi, least(mu_w) * least(1 / rho_[i]) * least(V[b]) * least_of(L), v_bi, D * L);
     }
     for (const Edge& e : edge_wall_[static_cast<std::size_t>(i)]) {
       pressure.inputs += rho0 * V[e.id] * std::abs(q_[i]) * kernel_.G(e.r) *
@@ -364,8 +343,8 @@ class ReferenceAt::Bounds {
     const Domain& domain = scene_.domain;
     if (periodic_)
       widest +=
-          3 * u *
-          (3 * (domain.max - domain.min).maxCoeff() + domain.min.cwiseAbs().cwiseMax(domain.max.cwiseAbs()).maxCoeff());
+          9 * u *
+          ((domain.max - domain.min).maxCoeff() + domain.min.cwiseAbs().cwiseMax(domain.max.cwiseAbs()).maxCoeff());
     return widest;
   }
   /// How far fp32's distance may be from the pair's, m. \param e  error of its separation
@@ -384,7 +363,7 @@ class ReferenceAt::Bounds {
       const Vec3 x_i = state_.position.col(particle);
       for (const auto j : near_H.fluid[i]) {
         const Vec3 x_j = state_.position.col(j), x_ij = separation_(x_i, x_j);
-        const double r = x_ij.norm(), off = margin(pair_error(x_i, x_j, x_ij, H_, u));
+        const double r = x_ij.norm(), off = margin(pair_error(x_i, x_j, x_ij, scene_.domain, H_, u));
         if (exact || std::abs(r - H_) > off) continue;
         edge_fluid_[i].push_back({j, std::min(r, H_) - off});
       }
@@ -426,15 +405,6 @@ ReferenceAt::ReferenceAt(const Scene& scene, const Walls& walls, const WallSolut
 ReferenceAt::~ReferenceAt() = default;
 ReferenceSolution ReferenceAt::solution(const StageInputs* given) { return bounds_->solution(given); }
 Fields ReferenceAt::fp32_fields(const StageInputs* given) const { return bounds_->fp32_fields(given); }
-
-WallSolution wall_solution(const Scene& scene, const Walls& walls) {
-  const WallNeighbors neighbors = find_wall_neighbors(scene, walls);
-  WallSolution a;
-  a.volume = boundary_volumes<double>(scene, neighbors);
-  a.tolerance = volume_tolerances(scene, neighbors, a.volume);
-  a.fp32_volume = boundary_volumes<float>(scene, neighbors);
-  return a;
-}
 
 ReferenceSolution reference_solution(const Scene& scene, const Walls& walls, const WallSolution& volumes,
                                      const ParticleState& state, const StageInputs* given) {

@@ -20,6 +20,8 @@
 namespace decant {
 
 inline constexpr double unit_roundoff = 0x1p-24;
+/// Of fp32: whatever is smaller a port may take for 0, or round to few digits.
+inline constexpr double smallest_normal = 0x1p-126;
 
 /// The oracle's fields with the tolerance of each value, laid out alike (integers: 0).
 struct ReferenceSolution {
@@ -56,7 +58,7 @@ WallSolution wall_solution(const Scene& scene, const Walls& walls);
 /// for W's norm, 7 (8) for G's, 4 for m, 5 for H in accelerations, and |Σ t (κ − 3)| for H in densities.
 ///
 /// A pair that fp32 may find on the other side of H adds its term at the nearest place that fp32 may find,
-/// to each of them. With `given`, density and pressure are inputs, exact to both sides: their tolerances
+/// to each of them. What underflow may take from accelerations stands in tolerances.md. With `given`, density and pressure are inputs, exact to both sides: their tolerances
 /// vanish from what follows; density alone is that of the equation of state.
 ReferenceSolution reference_solution(const Scene& scene, const Walls& walls, const WallSolution& volumes,
                                      const ParticleState& state, const StageInputs* given = nullptr);
