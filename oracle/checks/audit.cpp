@@ -42,12 +42,13 @@ struct Placed {
   double crossing_depth;  // m, of a path in the solid
 };
 
-/// Whether the segment a–b enters the solid deeper than `depth`. The distance changes by at most the
-/// way walked, so most segments are settled by their ends.
+/// Whether the segment a–b enters the solid deeper than `depth`; one that does by less than a 64th of it may not count,
+/// or a path along a wall at just that depth would be looked at point by point. The distance changes by at most the way
+/// walked, so most segments are settled by their ends.
 bool runs_deeper(const SolidDistance& solid, const Vec3& a, double at_a, const Vec3& b, double at_b, double depth) {
   const double length = (b - a).norm();
   if (at_a < -depth || at_b < -depth) return true;
-  if (0.5 * (at_a + at_b - length) >= -depth || length < 1e-9) return false;
+  if (!(0.5 * (at_a + at_b - length) < -depth * (1 + 1.0 / 64))) return false;
   const Vec3 middle = 0.5 * (a + b);
   const double at_middle = solid.at(middle).distance;
   return runs_deeper(solid, a, at_a, middle, at_middle, depth) || runs_deeper(solid, middle, at_middle, b, at_b, depth);
