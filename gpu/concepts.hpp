@@ -3,6 +3,7 @@
 /// NeighborSearch makes such ranges. core/solver.cuh makes a solver of a search; kernels/ sum over ranges.
 #pragma once
 
+#include "gpu/kernels/begin.cuh"
 #include "gpu/solver/context.cuh"
 
 #include <concepts>
@@ -35,7 +36,7 @@ template <class Search>
 concept NeighborSearch =
     requires(Search search, const Search& constant, Stream& stream, const Constants& c, ParticleArrays& arrays,
              const WallStore& walls, const Box& region, const DeviceGeometry& geometry, Branch branch, int substeps,
-             const DeviceStatus& status) {
+             const DeviceStatus& status, const Begin& begin) {
       requires std::constructible_from<Search, const SolverOptions&>;
       // Whether positions carry |x|² in place of a wall particle's ρ0 V_b and the mass.
       { Search::stores_square } -> std::convertible_to<bool>;
@@ -45,7 +46,8 @@ concept NeighborSearch =
       search.load(stream, c, arrays, walls, region);
       // Which arrays hold the state at a substep's start, and which at its end.
       constant.arrange(arrays);
-      search.begin(stream, arrays);
+      // Launches `begin`, and what the search needs beside it.
+      search.begin(stream, arrays, begin);
       // Neighbors of the state at hand, if those that are known do not serve any longer.
       search.template find_neighbors<false>(stream, arrays, geometry, branch);
       // Moves the particles and the walls to the end of the substep.

@@ -41,7 +41,7 @@ class AllParticles {
       });
   }
   void arrange(ParticleArrays& a) const { a.current = a.next = a.state; }
-  void begin(Stream&, const ParticleArrays&) {}
+  void begin(Stream& stream, const ParticleArrays&, const Begin& begin) { launch_begin(stream, begin); }
   template <bool periodic>
   void find_neighbors(Stream&, const ParticleArrays&, const DeviceGeometry&, Branch) {}
 

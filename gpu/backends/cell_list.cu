@@ -51,7 +51,8 @@ class CellList {
     a.current = a.spare;
     a.next = a.state;
   }
-  void begin(Stream& stream, const ParticleArrays& a) {
+  void begin(Stream& stream, const ParticleArrays& a, const Begin& begin) {
+    launch_begin(stream, begin);
     if (!counts_ahead()) return;
     fluid_.clear(stream);
     stream.launch(count_in_cells_kernel<FluidSource>, n_, fluid_.counter(fluid_source(a), scratch_));

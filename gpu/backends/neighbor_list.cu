@@ -44,6 +44,7 @@ class NeighborList {
     fluid_.prepare(stream, table, room_, scratch_);
     if (o_.verify) checker_.prepare(stream, table, room_, scratch_);
     stream.resize(origin_, static_cast<std::size_t>(room_) + read_past_end);
+    stream.resize(fastest_, 1);
     if (criterion() == Criterion::relative) {
       bucket_.resize(static_cast<std::size_t>(room_));
       boxes_.resize(2 * static_cast<std::size_t>(table.supers()));
@@ -76,12 +77,11 @@ class NeighborList {
   void arrange(ParticleArrays& a) const { a.current = a.next = a.state; }
 
   /// The skin of an advance's lists.
-  void begin(Stream& stream, const ParticleArrays& a) {
-    const bool predicts = o_.rebuild == 0;
-    if (o_.skin < 0 || predicts) stream.launch(find_fastest_kernel, n_, FindFastest{a, a.state.velocity});
+  void begin(Stream& stream, const ParticleArrays& a, const Begin& begin) {
     const float least = o_.skin < 0 ? static_cast<float>(narrowest) * c_.H : widest_skin_;
-    stream.launch(choose_skin_kernel, 1,
-                  ChooseSkin{c_, a.status, least, widest_skin_, predicts, tiles_.there() ? 6.0f : 0.9f});
+    launch_begin(stream, begin,
+                 ChooseSkin{c_, a.state.velocity, fastest_.get(), a.status, least, widest_skin_, o_.rebuild == 0,
+                            tiles_.there() ? 6.0f : 0.9f});
   }
 
   template <bool periodic>
@@ -266,7 +266,7 @@ class NeighborList {
   ListStorage lists_;
   TileStorage tiles_;
   Buffer<float4> origin_;
-  Buffer<int> bucket_;
+  Buffer<int> bucket_, fastest_;
   Buffer<DisplacementBox> boxes_;
   ListChecker checker_;
 };

@@ -21,7 +21,6 @@ struct DeviceStatus {
   int rebuild_needed;                  // neighbors must be found again
   float skin;                          // of the lists of this advance, m
   float prediction_time;               // how long before the middle of its lifetime a list is built, s
-  int fastest;                         // |v|² of the fastest particle, float bits
   float wall_step, wall_displacement;  // the most that any wall moves in this substep, and has moved
                                        // since the last rebuild, m
   long long stage_ns[3];               // build, density, force with integration, of persistent kernels

@@ -58,10 +58,10 @@ DECANT_DEVICE void place_wall(const ParticleArrays& a, const Walls& w, int slot,
   place_wall_for_force(a, w, slot, x, id, pose);
 }
 
-/// Wall particles to their place in the world: for densities and forces, at the end of the substep under
-/// way or before the first; or in two halves, each beside a pass that does not read what it writes: for
+/// Wall particles to their place in the world: before the first substep, when the status says nothing yet; at the end of
+/// the substep under way, for densities and forces; or in two halves, each beside a pass that does not read what it writes: for
 /// densities beside the forces of the substep that ends, for forces beside the densities of the next one.
-enum class WallsFor { both, density, force };
+enum class WallsFor { start, both, density, force };
 template <WallsFor what>
 struct PlaceWalls {
   ParticleArrays a;
@@ -71,7 +71,9 @@ struct PlaceWalls {
   DECANT_DEVICE void operator()(int k) const {
     const int slot = first + k, id = walls.id[slot];
     if (id < 0) return;
-    const DevicePose* poses = what == WallsFor::force ? a.poses_before() : a.poses_after();
+    const DevicePose* poses = what == WallsFor::start   ? a.poses
+                              : what == WallsFor::force ? a.poses_before()
+                                                        : a.poses_after();
     const DevicePose& pose = poses[walls.container[slot]];
     const Float3 x = rotate(pose, xyz(walls.local[slot])) + pose.translation;
     if (a.reach && !a.reach->holds(x)) return leave_out(slot);

@@ -39,18 +39,6 @@ struct DisplacementBox {
 
 DECANT_DEVICE float sound_skin(float skin) { return skin * (1.0f - 0x1p-10f); }
 
-/// The fastest particle's speed, for ChooseSkin.
-struct FindFastest {
-  ParticleArrays a;
-  const float4* velocity;
-
-  DECANT_DEVICE void operator()(int i) const {
-    const Float3 v = xyz(velocity[i]);
-    raise_to(&a.status->fastest, dot(v, v));  // not negative; NaN is the largest
-  }
-};
-DECANT_KERNEL(256) find_fastest_kernel(int n, FindFastest find) { for_each_thread(n, find); }
-
 /// The skin that costs least, and how far ahead lists are made. Lists serve for k + 1 substeps where s is
 /// k times the way v dt of a particle, and for no more until it is k + 1 times that; and they make the
 /// kernels longer. With a build that costs b and kernels that grow by g per H of skin, b/(k + 1) + g k v dt/H
@@ -59,14 +47,22 @@ DECANT_KERNEL(256) find_fastest_kernel(int n, FindFastest find) { for_each_threa
 /// uninterrupted one does.
 struct ChooseSkin {
   Constants c;
+  const float4* velocity;
+  int* fastest;  // |v|² of the fastest particle, float bits; −1 before and after
   DeviceStatus* status;
   float least, most;  // m
   bool predicts;
   float build_to_growth;  // b/g, as measured
 
-  DECANT_DEVICE void operator()(int) const {
+  DECANT_DEVICE void look_at(int i) const {
+    const Float3 v = xyz(velocity[i]);
+    raise_to(fastest, dot(v, v));  // not negative; NaN is the largest
+  }
+  DECANT_DEVICE void decide() const {
     constexpr float faster = 1.12f;  // than now, soon
-    const float per_substep = faster * radius(unordered(status->fastest)).r * c.dt;
+    const int found = atomic_load(fastest);
+    *fastest = -1;
+    const float per_substep = faster * radius(unordered(found > 0 ? found : 0)).r * c.dt;
     const float way = fmaxf(1e-6f * c.H, predicts ? per_substep : 2.0f * per_substep);
     const float best = rintf(radius(build_to_growth * c.H / way).r) - 1.0f, fits = floorf(most / way);
     const float s = way * (best < fits ? best : fits);
@@ -74,7 +70,6 @@ struct ChooseSkin {
     status->prediction_time = predicts ? 0.5f * status->skin / way * c.dt : 0.0f;
   }
 };
-DECANT_KERNEL(256) choose_skin_kernel(int n, ChooseSkin choose) { for_each_thread(n, choose); }
 
 struct RebuildCriterion {
   Criterion criterion;

@@ -2,7 +2,7 @@
 /// The device memory of one loaded scene: constants, geometry, poses, fluid state, walls, device status.
 #pragma once
 
-#include "gpu/kernels/store_state.cuh"
+#include "gpu/kernels/begin.cuh"
 #include "gpu/solver/context.cuh"
 #include "gpu/solver/device_solver.hpp"
 
@@ -94,9 +94,14 @@ class SceneArrays {
   /// The next load finds other walls than there are.
   void forget_walls() { loaded_walls_.reset(); }
 
-  void save_state(Stream& stream) {
-    stream.launch(copy_state_kernel, n_,
-                  CopyState{{state_.position.get(), state_.velocity.get()}, id_.get(), saved(), saved_ids()});
+  /// What an advance or evaluation begins with.
+  Begin begin(const ParticleArrays& a, bool keeps_state) const {
+    return {a,
+            {a, walls_.walls, 0},
+            walls_.padded_total(),
+            keeps_state,
+            {{state_.position.get(), state_.velocity.get()}, id_.get(), saved(), saved_ids()},
+            blocks_ended_.get()};
   }
   void restore_state(Stream& stream) {
     stream.launch(copy_state_kernel, n_,
@@ -209,6 +214,7 @@ class SceneArrays {
     stream.resize(force_velocity_, all);
     stream.resize(saved_, n * saved_bytes);
     stream.resize(status_, 1);
+    stream.upload(blocks_ended_, {0});
   }
   int sentinel() const { return padded(room_) + walls_.padded_total(); }
   /// In the arrays that neighbors are read from. Its squared distance is finite.
@@ -261,6 +267,7 @@ class SceneArrays {
   PinnedBuffer positions_, velocities_;
   Buffer<DeviceStatus> status_;
   PinnedBuffer status_read_;
+  Buffer<int> blocks_ended_;
   WallStore walls_{};
   Buffer<float4> wall_local_;
   Buffer<int> wall_id_, wall_container_;

@@ -162,10 +162,9 @@ class Solver : public DeviceSolver {
     DeviceStatus status;
     do {
       if (in_use_ != Structures::none) resume();
-      else begin();
+      else begin(false);
       with_periodic(c(), kernels);
-      stream_.wait();
-      status = scene_.status();
+      status = status_at_end();
       in_use_ = Structures::none;
     } while (grow(status));
     return status;
@@ -175,13 +174,11 @@ class Solver : public DeviceSolver {
   Status run_part(int& substeps, const std::vector<DevicePose>& poses) {
     upload_poses(poses);
     in_use_ = Structures::none;  // should anything below fail
-    scene_.save_state(stream_);
     DeviceStatus status;
     for (;;) {
-      begin();
+      begin(true);
       in_use_ = run(substeps);
-      stream_.wait();
-      status = scene_.status();
+      status = status_at_end();
       bool again = grow(status);
       if (halo_ && !again) {
         const int hold = halo_->substeps_that_hold(substeps);
@@ -288,16 +285,14 @@ class Solver : public DeviceSolver {
     stream_.wait();  // the two buffers end here
   }
 
-  /// No substep yet, nothing found, walls in place, and neighbors to be looked for.
-  void begin() {
-    DeviceStatus status{};
-    status.non_finite = status.escaped = status.missed_pair = DeviceStatus::none;
-    status.rebuild_needed = 1;
-    scene_.set_status(status);
+  void begin(bool keeps_state) {
     const ParticleArrays a = arrays();
-    stream_.launch(place_walls_kernel<WallsFor::both>, scene_.walls().padded_total(),
-                   PlaceWalls<WallsFor::both>{a, scene_.walls().walls, 0});
-    search_.begin(stream_, a);
+    search_.begin(stream_, a, scene_.begin(a, keeps_state));
+  }
+  /// When all is done that was launched; the read-back waits for it.
+  DeviceStatus status_at_end() {
+    stream_.run_transfers();
+    return scene_.status();
   }
 
   /// For fields of what the next substep of an advance would use: only what that one would do first is done.
