@@ -112,10 +112,14 @@ const std::vector<Entry>& entries() {
        [](O& o, const std::string& v) {
          o.skin = v == "auto" ? -1 : number("skin", v, 0.0, 1.0, "must be auto or in 0 … 1, a share of H");
        }},
-      {{"list", "tiles", "tiles", "off, on",
-        "on: blocks keep what is near their particles in shared memory, where the scene is small enough", false},
+      {{"list", "tiles", "tiles", "auto, on, off",
+        "on: blocks keep what is near their particles in shared memory, where the scene is small enough; auto: on a "
+        "GPU",
+        false},
        [](O& o, const std::string& v) {
-         o.tiles = one_of<bool>("tiles", v, {{"off", "off", false}, {"on", "on", true}});
+         o.tiles = one_of<O::Tiles>(
+             "tiles", v,
+             {{"auto", "auto", O::Tiles::automatic}, {"on", "on", O::Tiles::on}, {"off", "off", O::Tiles::off}});
        }},
       {{"list", "check_completeness", "verify", "off, on",
         "on: counts in every substep which pairs its lists lack; with rebuild=auto one is an error", false},

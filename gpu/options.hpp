@@ -14,6 +14,7 @@ struct SolverOptions {
   enum class Pairs { keep, rescan };     // hash: the force pass reads a list, or cells again
   enum class Build { grid, all_pairs };  // list: from cells, or from all pairs
   enum class Trigger { local, global };  // list: what `rebuild auto` watches
+  enum class Tiles { automatic, on, off };
   enum class Launch { automatic, graphs, plain };
 
   Grid grid = Grid::all;
@@ -27,7 +28,7 @@ struct SolverOptions {
   int lanes = 0;                      // threads a particle; 0: by the number of particles
   int capacity = 0;                   // entries a list begins with; 0: by the skin
   Launch launch = Launch::automatic;  // of substeps: many at once, recorded as graphs, one by one
-  bool tiles = false;                 // list: small scenes in shared memory
+  Tiles tiles = Tiles::automatic;     // list: small scenes in shared memory
   int ranks = 1;                      // threads of this process that share the particles
   double halo_margin = -1;            // of H: how far ghosts reach beyond it; negative: by speed and size
   bool verify = false;                // list: counts in every substep what its lists miss (verify.cuh)

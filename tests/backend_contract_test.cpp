@@ -20,27 +20,18 @@ namespace {
 
 using test::nan;
 
-struct Choice {
-  std::string name;
-  Executor executor;
-};
-
-void PrintTo(const Choice& choice, std::ostream* out) { *out << choice.name; }
-
-std::vector<Choice> choices() {
-  std::vector<Choice> all = {{"reference", Executor::host}};
-  for (const auto& name : test::backend_variants())
-    for (const auto executor : {Executor::host, Executor::cuda}) all.push_back({name, executor});
+std::vector<test::Variant> choices() {
+  std::vector<test::Variant> all = test::backend_variants();
+  all.push_back({"reference", Executor::host});
   return all;
 }
 
-class BackendContract : public testing::TestWithParam<Choice> {
+class BackendContract : public testing::TestWithParam<test::Variant> {
  protected:
   void SetUp() override {
     std::string why_not;
     if (!executor_available(GetParam().executor, &why_not)) GTEST_SKIP() << why_not;
-    backend_ = GetParam().name == "reference" ? make_reference_backend()
-                                              : test::make_variant(GetParam().name, GetParam().executor);
+    backend_ = GetParam().name == "reference" ? make_reference_backend() : test::make_variant(GetParam());
   }
 
   void load(const Fixture& f) { backend_->load(f.scene, sample_walls(f.scene), f.state); }
@@ -311,8 +302,7 @@ TEST_P(BackendContract, AParticleThatLeavesTheDomainIsReportedWhenItDoes) {
   EXPECT_EQ(status.substep, f.state.substep + 5);
 }
 
-INSTANTIATE_TEST_SUITE_P(Backends, BackendContract, testing::ValuesIn(choices()),
-                         [](const auto& chosen) { return test::plain_name(chosen.param.name, chosen.param.executor); });
+INSTANTIATE_TEST_SUITE_P(Backends, BackendContract, testing::ValuesIn(choices()), test::variant_name);
 
 }  // namespace
 }  // namespace decant

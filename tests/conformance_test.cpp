@@ -69,12 +69,12 @@ TEST(Fixtures, AreJudgedTheSameByAllPairsAsByCells) {
   EXPECT_EQ(objections(*backend, fixture), "");
 }
 
-class Conformance : public testing::TestWithParam<std::tuple<std::string, Executor>> {
+class Conformance : public testing::TestWithParam<test::Variant> {
  protected:
-  std::unique_ptr<Backend> backend() { return test::make_variant(std::get<0>(GetParam()), std::get<1>(GetParam())); }
+  std::unique_ptr<Backend> backend() { return test::make_variant(GetParam()); }
   void SetUp() override {
     std::string why_not;
-    if (!executor_available(std::get<1>(GetParam()), &why_not)) GTEST_SKIP() << why_not;
+    if (!executor_available(GetParam().executor, &why_not)) GTEST_SKIP() << why_not;
   }
 };
 
@@ -86,7 +86,7 @@ TEST_P(Conformance, HoldsOnEverySmallFixture) {
 
 TEST_P(Conformance, HoldsInEveryCheck) {
   // Rebuilt every so many substeps, whatever moves, a list misses pairs in a run.
-  const bool may_miss = std::get<0>(GetParam()).find("rebuild=") != std::string::npos;
+  const bool may_miss = GetParam().name.find("rebuild=") != std::string::npos;
   CheckSelection checks = all_checks();
   if (may_miss) checks.erase("trajectory");
   static const Fixture fixture = read_fixture(DECANT_SOURCE_DIR "/fixtures/pour-4k-splash.h5");
@@ -97,7 +97,7 @@ TEST_P(Conformance, HoldsInEveryCheck) {
 
 TEST_P(Conformance, HoldsOnRandomScenes) {
   const auto tested = backend();
-  if (std::get<0>(GetParam()).find(':') != std::string::npos) {
+  if (GetParam().name.find(':') != std::string::npos) {
     for (std::uint32_t seed = 1; seed <= 6; ++seed)
       EXPECT_EQ(objections(*tested, answered(test::random_fixture(seed))), "") << seed;
     return;
@@ -217,12 +217,7 @@ TEST(Lists, MissNothingInRandomScenes) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Backends, Conformance,
-                         testing::Combine(testing::ValuesIn(test::backend_variants()),
-                                          testing::Values(Executor::host, Executor::cuda)),
-                         [](const auto& chosen) {
-                           return test::plain_name(std::get<0>(chosen.param), std::get<1>(chosen.param));
-                         });
+INSTANTIATE_TEST_SUITE_P(Backends, Conformance, testing::ValuesIn(test::backend_variants()), test::variant_name);
 
 }  // namespace
 }  // namespace decant

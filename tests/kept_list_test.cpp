@@ -127,7 +127,7 @@ TEST_P(KeptList, GivesTheSameHoweverSubstepsAreLaunched) {
   const auto expect_same = [&](const Scene& scene, const ParticleState& start, int substeps) {
     const Walls walls = sample_walls(scene);
     const auto run = [&](const std::string& launch) {
-      const auto list = make("list:launch=" + launch);
+      const auto list = make("list:tiles=off:launch=" + launch);  // in tiles sums have another order
       list->load(scene, walls, start);
       const Status status = list->advance(substeps);
       ParticleState end;

@@ -19,26 +19,13 @@
 namespace decant {
 namespace {
 
-struct Choice {
-  std::string name;
-  Executor executor;
-};
-void PrintTo(const Choice& choice, std::ostream* out) { *out << choice.name; }
-
-std::vector<Choice> choices() {
-  std::vector<Choice> all;
-  for (const Executor executor : {Executor::host, Executor::cuda})
-    for (const std::string& name : test::backend_variants()) all.push_back({name, executor});
-  return all;
-}
-
-class Resume : public testing::TestWithParam<Choice> {
+class Resume : public testing::TestWithParam<test::Variant> {
  protected:
   void SetUp() override {
     std::string why_not;
     if (!executor_available(GetParam().executor, &why_not)) GTEST_SKIP() << why_not;
   }
-  std::unique_ptr<Backend> make() const { return test::make_variant(GetParam().name, GetParam().executor); }
+  std::unique_ptr<Backend> make() const { return test::make_variant(GetParam()); }
 
   /// `frames` advances of `substeps`, fields looked at after each as a pour does; another backend that is
   /// given the state before an advance must come to the same state and the same fields.
@@ -104,8 +91,7 @@ TEST_P(Resume, EndsInTheSameBitsInTheStream) {
   expect_same_bits(f.scene, f.state, 2, f.scene.schedule.substeps_per_frame);
 }
 
-INSTANTIATE_TEST_SUITE_P(Backends, Resume, testing::ValuesIn(choices()),
-                         [](const auto& chosen) { return test::plain_name(chosen.param.name, chosen.param.executor); });
+INSTANTIATE_TEST_SUITE_P(Backends, Resume, testing::ValuesIn(test::backend_variants()), test::variant_name);
 
 }  // namespace
 }  // namespace decant

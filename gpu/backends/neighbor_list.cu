@@ -27,16 +27,21 @@ class NeighborList {
     walls_ = walls;
     const bool at_once = o_.launch == SolverOptions::Launch::automatic && !o_.verify && from_cells() &&
                          criterion() != Criterion::relative && !a.on_ranks();
-    const bool tiled = at_once && o_.tiles && !c.any_periodic;
+    const float spacing = std::cbrt(c.mass / c.rest_density);
+    tiles_.clear();
+    const bool tiled = at_once && wants_tiles() && !c.any_periodic &&
+                       (o_.lanes == 0 || o_.lanes == TileMemory::lanes) &&
+                       tiles_.serve(persistent_tiles_kernel, n_, a.sentinel, a.containers,
+                                    (1 + (o_.skin >= 0 ? o_.skin : widest_of_tiles)) * c.H / spacing);
     const double skin = o_.skin >= 0 ? o_.skin : tiled ? widest_of_tiles : widest;
     widest_skin_ = static_cast<float>(skin) * c.H;
     const float reach = c.H + widest_skin_;
 #ifdef __CUDACC__
-    lanes_ = std::min(o_.lanes                  ? o_.lanes
-                      : tiled && fits_tiles(n_) ? TileMemory::lanes
-                      : n_ < 25000              ? 4
-                      : is_large(a.total)       ? 1
-                                                : 2,
+    lanes_ = std::min(o_.lanes            ? o_.lanes
+                      : tiled             ? TileMemory::lanes
+                      : n_ < 25000        ? 4
+                      : is_large(a.total) ? 1
+                                          : 2,
                       c.any_periodic ? most_lanes<true> : most_lanes<false>);
 #endif
     table_ = {c, region, reach, is_large(a.total) ? room_ : a.total};
@@ -54,11 +59,8 @@ class NeighborList {
     scene_.set(c, a.total, region);
     lists_.reserve(room_, lanes_);
     persistent_blocks_ = 0;
-    tiles_.clear();
-    if (!at_once) return;
-    if (tiled && lanes_ == TileMemory::lanes && fits_tiles(n_))
-      tiles_.prepare(stream, persistent_tiles_kernel, n_, a.sentinel, a.containers, fluid_.table(), 1 + skin);
-    if (tiles_.there()) return;
+    if (tiled) tiles_.prepare(stream, fluid_.table());
+    if (tiled || !at_once) return;
     with_periodic(c_, [&](auto periodic) {
       constexpr bool p = decltype(periodic)::value;
       this->template with_persistent_lanes<p>([&](auto lanes) {
@@ -141,6 +143,13 @@ class NeighborList {
   }
 
  private:
+  bool wants_tiles() const {
+#ifdef __CUDACC__
+    return o_.tiles != SolverOptions::Tiles::off;
+#else
+    return o_.tiles == SolverOptions::Tiles::on;  // slower: nothing is shared there
+#endif
+  }
   bool from_cells() const { return o_.build == SolverOptions::Build::grid; }
   Criterion criterion() const {
     if (o_.rebuild != 0) return Criterion::interval;

@@ -10,51 +10,52 @@
 namespace decant::gpu {
 namespace {
 
-/// Whether each of n particles has its threads at once.
-inline bool fits_tiles(int n) { return n <= most_blocks() * (persistent_block / TileMemory::lanes); }
-
 class TileStorage {
  public:
-  void clear() {
-    blocks_ = 0;
-    too_small_ = false;
-  }
   /// Whether the next advance runs in tiles.
   bool there() const { return blocks_ > 0 && !too_small_; }
   /// After an advance without them. Whether one runs in tiles depends on its state and nothing before, so that a resumed
   /// pour keeps its bits.
   void serve_again() { too_small_ = false; }
 
+  void clear() {
+    blocks_ = 0;
+    too_small_ = false;
+  }
+  /// Whether a scene is to run in tiles: each of n particles has its threads at once, each block can look through all
+  /// that there is, and a tile is likely to find room.
   /// \param sentinel  index beyond all particles
-  /// \param ratio     radius of the lists by H
+  /// \param reach     radius of the lists, in dx
   template <class Kernel>
-  void prepare(Stream& stream, Kernel kernel, int n, int sentinel, int containers, const CellTable& table,
-               double ratio) {
+  bool serve(Kernel kernel, int n, int sentinel, int containers, double reach) {
+    const bool same = n == n_ && sentinel == sentinel_;
+    n_ = n;
+    sentinel_ = sentinel;
+    if (!same) bytes_ = 0;
+    constexpr int most_particles = 32 * persistent_block;
+    if (n > most_blocks() * (persistent_block / TileMemory::lanes) || sentinel > most_particles) return false;
     most_bytes_ = most_shared_bytes(kernel) / 16 * 16;  // it is read by so many at a time
-    const int blocks = wanted_blocks(n);
-    const int own = (n + blocks - 1) / blocks;
-    // A cube of particles dx apart and those within reach of it, H being about 2 dx, walls among them; free surfaces
-    // and what is not quite a cube are left to `grow`.
-    const double locals = std::pow(std::cbrt(own) + 4 * ratio, 3),
-                 listed = 41 * std::pow(ratio, 3) / TileMemory::lanes + 4;
+    if (persistent_blocks(kernel, most_bytes_) == 0) return false;
+    const int blocks = wanted_blocks(n), own = (n + blocks - 1) / blocks;
+    // A cube of particles and those within reach of it, walls among them; free surfaces and what is not quite a cube are
+    // left to `grow`.
+    const double locals = std::pow(std::cbrt(own) + 2 * reach, 3),
+                 listed = 5.1 * std::pow(reach, 3) / TileMemory::lanes + 4;
     const long long wanted =
         TileMemory::bytes_of(own, static_cast<long long>(locals), 0, static_cast<long long>(std::ceil(listed / 4)),
                              TileMemory::bit_words(sentinel), containers);
-    // All of them are looked through by each block.
-    constexpr int most_particles = 32 * persistent_block;
-    if (wanted > static_cast<long long>(most_bytes_) || sentinel > most_particles) return;
-    if (persistent_blocks(kernel, most_bytes_) == 0) return;
-    const bool served = n == n_ && sentinel == sentinel_;
-    if (!served) bytes_ = 0;
+    if (wanted > static_cast<long long>(most_bytes_)) return false;
     bytes_ = std::max(bytes_, whole(wanted));
-    n_ = n;
-    sentinel_ = sentinel;
     blocks_ = blocks;
+    return true;
+  }
+  /// Memory for the scene that they serve.
+  void prepare(Stream& stream, const CellTable& table) {
     const auto rows = static_cast<std::size_t>(TileOrder::rows(table));
     stream.resize(count_, rows);
     stream.resize(start_, rows);
-    stream.resize(particle_, static_cast<std::size_t>(n));
-    stream.resize(terms_, static_cast<std::size_t>(n));
+    stream.resize(particle_, static_cast<std::size_t>(n_));
+    stream.resize(terms_, static_cast<std::size_t>(n_));
     reserve();
   }
   /// Room for a tile of so many bytes; where no block has as many the advance is to run without tiles. Whether anything
