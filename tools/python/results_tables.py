@@ -335,7 +335,7 @@ def tiles():
     times = {(r["options"], r["window"]): r for r in rows}
     shown = []
     for phase in sorted({r["window"] for r in rows}, key=PHASES.index):
-        without, with_tiles = times["", phase], times["tiles=on", phase]
+        without, with_tiles = times["tiles=off", phase], times["", phase]
         shown.append(
             [
                 phase,
