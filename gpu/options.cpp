@@ -47,15 +47,15 @@ using O = SolverOptions;
 /// \param v  the value's text
 void set_threads(O& o, const std::string& v) {
   const std::string bound = "must be 1, 2, 4 or 8";
-  o.lanes = number("threads_per_particle", v, 1, 8, bound);
-  if (o.lanes & (o.lanes - 1)) refuse("threads_per_particle", v, bound);
+  o.threads_per_particle = number("threads_per_particle", v, 1, 8, bound);
+  if (o.threads_per_particle & (o.threads_per_particle - 1)) refuse("threads_per_particle", v, bound);
 }
 
 void set_launch(O& o, const std::string& v) {
   o.launch = one_of<O::Launch>("launch", v,
                                {{"auto", "auto", O::Launch::automatic},
-                                {"graph", "graphs", O::Launch::graphs},
-                                {"stream", "plain", O::Launch::plain}});
+                                {"graph", "graphs", O::Launch::graph},
+                                {"stream", "plain", O::Launch::stream}});
 }
 
 void set_capacity(O& o, const std::string& v) {
@@ -71,14 +71,15 @@ const std::vector<Entry>& entries() {
   static const std::vector<Entry> all = {
       {{"hash", "wall_cells", "grid", "on, off", "off: every wall particle is tested", true},
        [](O& o, const std::string& v) {
-         o.grid = one_of<O::Grid>("wall_cells", v, {{"on", "all", O::Grid::all}, {"off", "fluid", O::Grid::fluid}});
+         o.wall_cells = one_of<O::WallCells>("wall_cells", v,
+                                             {{"on", "all", O::WallCells::on}, {"off", "fluid", O::WallCells::off}});
        }},
       {{"hash", "moving_walls", "source", "body_frame, rebuilt",
         "looked up in the container's frame, or sorted anew every substep", true},
        [](O& o, const std::string& v) {
-         o.source =
-             one_of<O::Source>("moving_walls", v,
-                               {{"body_frame", "frame", O::Source::frame}, {"rebuilt", "rebuilt", O::Source::rebuilt}});
+         o.moving_walls = one_of<O::MovingWalls>(
+             "moving_walls", v,
+             {{"body_frame", "frame", O::MovingWalls::body_frame}, {"rebuilt", "rebuilt", O::MovingWalls::rebuilt}});
        }},
       {{"hash", "sort", "sort", "counting, thrust", "how particles come into the order of their cells", true},
        [](O& o, const std::string& v) {
@@ -88,8 +89,9 @@ const std::vector<Entry>& entries() {
       {{"hash", "force_neighbors", "pairs", "cached, recomputed",
         "the force pass reads the pairs that were found, or searches again", true},
        [](O& o, const std::string& v) {
-         o.pairs = one_of<O::Pairs>("force_neighbors", v,
-                                    {{"cached", "keep", O::Pairs::keep}, {"recomputed", "rescan", O::Pairs::rescan}});
+         o.force_neighbors = one_of<O::ForceNeighbors>(
+             "force_neighbors", v,
+             {{"cached", "keep", O::ForceNeighbors::cached}, {"recomputed", "rescan", O::ForceNeighbors::recomputed}});
        }},
       {{"list", "build", "build", "grid, all-pairs", "lists from cells, or from all pairs", true},
        [](O& o, const std::string& v) {
@@ -103,9 +105,9 @@ const std::vector<Entry>& entries() {
       {{"list", "criterion", "trigger", "displacement, relative",
         "what rebuild=auto bounds: displacements, or those of neighboring cells against each other", true},
        [](O& o, const std::string& v) {
-         o.trigger = one_of<O::Trigger>(
+         o.criterion = one_of<O::Criterion>(
              "criterion", v,
-             {{"displacement", "global", O::Trigger::global}, {"relative", "local", O::Trigger::local}});
+             {{"displacement", "global", O::Criterion::displacement}, {"relative", "local", O::Criterion::relative}});
        }},
       {{"list", "skin", "skin", "auto, a share of H", "how far beyond H lists reach; auto: by the fastest particle",
         true},
@@ -124,7 +126,7 @@ const std::vector<Entry>& entries() {
       {{"list", "check_completeness", "verify", "off, on",
         "on: counts in every substep which pairs its lists lack; with rebuild=auto one is an error", false},
        [](O& o, const std::string& v) {
-         o.verify = one_of<bool>("check_completeness", v, {{"off", "off", false}, {"on", "on", true}});
+         o.check_completeness = one_of<bool>("check_completeness", v, {{"off", "off", false}, {"on", "on", true}});
        }},
       {{"hash list", "threads_per_particle", "lanes", "1, 2, 4, 8", "default: by the number of particles", false},
        set_threads},
@@ -193,8 +195,8 @@ SolverOptions parse_options(const std::string& backend, const std::string& text)
     entry->set(options, item.substr(equals + 1));
     at = end + 1;
   }
-  if (backend == "hash" && options.ranks > 1 && options.lanes > 1)
-    refuse("threads_per_particle", std::to_string(options.lanes),
+  if (backend == "hash" && options.ranks > 1 && options.threads_per_particle > 1)
+    refuse("threads_per_particle", std::to_string(options.threads_per_particle),
            "1 with ranks: the order of sums would depend on a rank's share");
   if (options.rebuild == 0 && options.skin >= 0 && options.skin < 0.01)
     refuse("skin", text, "at least 0.01 where --rebuild is auto: without skin every move is too far");

@@ -8,30 +8,33 @@
 namespace decant::gpu {
 
 struct SolverOptions {
-  enum class Grid { fluid, all };        // which particles have cells; others are all looked at
-  enum class Source { frame, rebuilt };  // moving walls: in their frame, or sorted every substep
+  // Options and values go by their names on the command line.
+  enum class WallCells { on, off };
+  enum class MovingWalls { body_frame, rebuilt };
   enum class Sort { counting, thrust };
-  enum class Pairs { keep, rescan };     // hash: the force pass reads a list, or cells again
-  enum class Build { grid, all_pairs };  // list: from cells, or from all pairs
-  enum class Trigger { local, global };  // list: what `rebuild auto` watches
+  enum class ForceNeighbors { cached, recomputed };
+  enum class Build { grid, all_pairs };
+  enum class Criterion { displacement, relative };
   enum class Tiles { automatic, on, off };
-  enum class Launch { automatic, graphs, plain };
+  enum class Launch { automatic, graph, stream };
 
-  Grid grid = Grid::all;
-  Source source = Source::frame;
+  WallCells wall_cells = WallCells::on;
+  MovingWalls moving_walls = MovingWalls::body_frame;
   Sort sort = Sort::counting;
-  Pairs pairs = Pairs::keep;
+  ForceNeighbors force_neighbors = ForceNeighbors::cached;
   Build build = Build::grid;
-  Trigger trigger = Trigger::global;
-  int rebuild = 0;                    // list: every so many substeps; 0: as soon as a pair could be missed
-  double skin = -1;                   // list: of H; negative: by the speed of the fastest particle
-  int lanes = 0;                      // threads a particle; 0: by the number of particles
-  int capacity = 0;                   // entries a list begins with; 0: by the skin
-  Launch launch = Launch::automatic;  // of substeps: many at once, recorded as graphs, one by one
-  Tiles tiles = Tiles::automatic;     // list: small scenes in shared memory
-  int ranks = 1;                      // threads of this process that share the particles
-  double halo_margin = -1;            // of H: how far ghosts reach beyond it; negative: by speed and size
-  bool verify = false;                // list: counts in every substep what its lists miss (verify.cuh)
+  Criterion criterion = Criterion::displacement;
+  int rebuild = 0;               // substeps; 0: auto
+  double skin = -1;              // of H; negative: auto
+  int threads_per_particle = 0;  // 0: by the number of particles
+  int capacity = 0;              // entries per thread that a list begins with; 0: by the skin
+  Launch launch = Launch::automatic;
+  Tiles tiles = Tiles::automatic;
+  int ranks = 1;
+  double halo_margin = -1;  // of H; negative: auto
+  bool check_completeness = false;
+
+  bool operator==(const SolverOptions&) const = default;
 };
 
 /// One option of the command line.

@@ -9,12 +9,6 @@
 namespace decant::gpu {
 namespace {
 
-bool same(const SolverOptions& a, const SolverOptions& b) {
-  return a.grid == b.grid && a.source == b.source && a.sort == b.sort && a.pairs == b.pairs && a.build == b.build &&
-         a.trigger == b.trigger && a.rebuild == b.rebuild && a.skin == b.skin && a.lanes == b.lanes &&
-         a.capacity == b.capacity && a.launch == b.launch && a.verify == b.verify;
-}
-
 TEST(BackendOptions, AreTakenByTheirEarlierNamesToo) {
   const struct {
     const char *backend, *now, *before;
@@ -27,12 +21,12 @@ TEST(BackendOptions, AreTakenByTheirEarlierNamesToo) {
       {"list", "launch=graph:threads-per-particle=1", "launch=graphs:lanes=1"},
   };
   for (const auto& [backend, now, before] : pairs) {
-    EXPECT_TRUE(same(parse_options(backend, now), parse_options(backend, before))) << now;
-    EXPECT_FALSE(same(parse_options(backend, now), {})) << now;
+    EXPECT_TRUE(parse_options(backend, now) == parse_options(backend, before)) << now;
+    EXPECT_FALSE(parse_options(backend, now) == SolverOptions()) << now;
   }
   const SolverOptions defaults =
       parse_options("hash", "wall_cells=on:moving_walls=body_frame:force_neighbors=cached:sort=counting:launch=auto");
-  EXPECT_TRUE(same(defaults, {}));
+  EXPECT_TRUE(defaults == SolverOptions());
 }
 
 TEST(BackendOptions, AreRefusedByKeyValueAndBound) {

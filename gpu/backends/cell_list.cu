@@ -23,20 +23,20 @@ class CellList {
     room_ = a.room;
     walls_ = walls;
 #ifdef __CUDACC__
-    lanes_ = std::min(o_.lanes            ? o_.lanes
-                      : a.on_ranks()      ? 1  // the only order of sums that does not depend on a rank's share
-                      : n_ < 8000         ? 8
-                      : n_ < 25000        ? 4
-                      : is_large(a.total) ? 1
-                                          : 2,
+    lanes_ = std::min(o_.threads_per_particle ? o_.threads_per_particle
+                      : a.on_ranks()          ? 1  // the only order of sums that does not depend on a rank's share
+                      : n_ < 8000             ? 8
+                      : n_ < 25000            ? 4
+                      : is_large(a.total)     ? 1
+                                              : 2,
                       c.any_periodic || !keeps_pairs() ? most_lanes<true> : most_lanes<false>);
 #endif
     table_ = {c, region, c.H, is_large(a.total) ? room_ : a.total};
     fluid_.prepare(stream, table_.whole(), room_, scratch_);
-    wall_cells_.prepare(
-        stream, c_, a, walls_,
-        {o_.grid == SolverOptions::Grid::all, o_.source == SolverOptions::Source::rebuilt, !is_large(a.total), c.H},
-        scratch_);
+    wall_cells_.prepare(stream, c_, a, walls_,
+                        {o_.wall_cells == SolverOptions::WallCells::on,
+                         o_.moving_walls == SolverOptions::MovingWalls::rebuilt, !is_large(a.total), c.H},
+                        scratch_);
     if (!scene_.is(c, a.total, region)) lists_.choose_capacity(o_.capacity, 1, lanes_);
     scene_.set(c, a.total, region);
     if (keeps_pairs()) lists_.reserve(room_, lanes_);
@@ -119,16 +119,16 @@ class CellList {
     return false;
   }
   bool capturable() const {
-    return o_.launch != SolverOptions::Launch::plain && o_.sort == SolverOptions::Sort::counting;
+    return o_.launch != SolverOptions::Launch::stream && o_.sort == SolverOptions::Sort::counting;
   }
   bool grow(const DeviceStatus& status) { return lists_.grow(room_, status.longest_list); }
   std::size_t bytes() const { return fluid_.bytes() + wall_cells_.bytes() + scratch_.bytes() + lists_.bytes(); }
 
  private:
-  bool keeps_pairs() const { return o_.pairs == SolverOptions::Pairs::keep; }
+  bool keeps_pairs() const { return o_.force_neighbors == SolverOptions::ForceNeighbors::cached; }
   /// Integration counts for the sort of the next substep. A sort of walls would write over that.
   bool counts_ahead() const {
-    return o_.sort == SolverOptions::Sort::counting && o_.source == SolverOptions::Source::frame;
+    return o_.sort == SolverOptions::Sort::counting && o_.moving_walls == SolverOptions::MovingWalls::body_frame;
   }
   FluidSource fluid_source(const ParticleArrays& a) const { return {c_, a, a.state, a.spare, nullptr, nullptr, {}}; }
   Candidates candidates(const ParticleArrays& a) const { return wall_cells_.candidates(a, fluid_.table(), false); }

@@ -25,29 +25,29 @@ class NeighborList {
     n_ = a.n;
     room_ = a.room;
     walls_ = walls;
-    const bool at_once = o_.launch == SolverOptions::Launch::automatic && !o_.verify && from_cells() &&
+    const bool at_once = o_.launch == SolverOptions::Launch::automatic && !o_.check_completeness && from_cells() &&
                          criterion() != Criterion::relative && !a.on_ranks();
     const float spacing = std::cbrt(c.mass / c.rest_density);
     tiles_.clear();
     const bool tiled = at_once && wants_tiles() && !c.any_periodic &&
-                       (o_.lanes == 0 || o_.lanes == TileMemory::lanes) &&
+                       (o_.threads_per_particle == 0 || o_.threads_per_particle == TileMemory::lanes) &&
                        tiles_.serve(persistent_tiles_kernel, n_, a.sentinel, a.containers,
                                     (1 + (o_.skin >= 0 ? o_.skin : widest_of_tiles)) * c.H / spacing);
     const double skin = o_.skin >= 0 ? o_.skin : tiled ? widest_of_tiles : widest;
     widest_skin_ = static_cast<float>(skin) * c.H;
     const float reach = c.H + widest_skin_;
 #ifdef __CUDACC__
-    lanes_ = std::min(o_.lanes            ? o_.lanes
-                      : tiled             ? TileMemory::lanes
-                      : n_ < 25000        ? 4
-                      : is_large(a.total) ? 1
-                                          : 2,
+    lanes_ = std::min(o_.threads_per_particle ? o_.threads_per_particle
+                      : tiled                 ? TileMemory::lanes
+                      : n_ < 25000            ? 4
+                      : is_large(a.total)     ? 1
+                                              : 2,
                       c.any_periodic ? most_lanes<true> : most_lanes<false>);
 #endif
     table_ = {c, region, reach, is_large(a.total) ? room_ : a.total};
     const CellTable table = table_.whole();
     fluid_.prepare(stream, table, room_, scratch_);
-    if (o_.verify) checker_.prepare(stream, table, room_, scratch_);
+    if (o_.check_completeness) checker_.prepare(stream, table, room_, scratch_);
     stream.resize(origin_, static_cast<std::size_t>(room_) + read_past_end);
     stream.resize(fastest_, 1);
     if (criterion() == Criterion::relative) {
@@ -89,7 +89,7 @@ class NeighborList {
   template <bool periodic>
   void find_neighbors(Stream& stream, const ParticleArrays& a, const DeviceGeometry& geometry, Branch rebuild) {
     stream.when(&a.status->rebuild_needed, rebuild, [&] { this->template rebuild<periodic>(stream, a, geometry); });
-    if (o_.verify) check_lists<periodic>(stream, a);
+    if (o_.check_completeness) check_lists<periodic>(stream, a);
   }
 
   template <bool periodic, class Call>
@@ -132,7 +132,7 @@ class NeighborList {
     });
     return true;
   }
-  bool capturable() const { return o_.launch != SolverOptions::Launch::plain; }
+  bool capturable() const { return o_.launch != SolverOptions::Launch::stream; }
   bool grow(const DeviceStatus& status) {
     if (lists_.grow(room_, status.longest_list)) return true;
     return status.tile_bytes != 0 && tiles_.grow(status.tile_bytes);
@@ -153,7 +153,8 @@ class NeighborList {
   bool from_cells() const { return o_.build == SolverOptions::Build::grid; }
   Criterion criterion() const {
     if (o_.rebuild != 0) return Criterion::interval;
-    return o_.trigger == SolverOptions::Trigger::local && from_cells() ? Criterion::relative : Criterion::displacement;
+    return o_.criterion == SolverOptions::Criterion::relative && from_cells() ? Criterion::relative
+                                                                              : Criterion::displacement;
   }
   RebuildCriterion rebuild_criterion(Branch next_rebuild) const {
     return {criterion(),   o_.rebuild,   origin_.get(),           fluid_.table(),
