@@ -16,6 +16,7 @@
 #include "gpu/solver/halo.cuh"
 #include "gpu/solver/output_buffers.cuh"
 #include "gpu/solver/scene_arrays.cuh"
+#include "gpu/solver/status_of.cuh"
 #include "reference/error.hpp"
 
 #include <algorithm>
@@ -74,7 +75,7 @@ class Solver : public DeviceSolver {
     output_.clear();  // memory that a run does not need
     if (!given.boundary_volume.empty()) scene_.set_boundary_volumes(own_volume);
     out.boundary_volume = std::move(own_volume);
-    return status_of(status);
+    return agreed_status(status);
   }
 
   Status evaluate_density(const std::vector<DevicePose>& poses, HostFields& out) override {
@@ -87,7 +88,7 @@ class Solver : public DeviceSolver {
     });
     output_.download(out);
     output_.clear();
-    return status_of(status);
+    return agreed_status(status);
   }
 
   Status advance(int substeps, const std::vector<DevicePose>& poses) override {
@@ -195,7 +196,7 @@ class Solver : public DeviceSolver {
     totals_.missed += status.pairs_missed;
     totals_.wall_pairs += status.wall_pairs;
     totals_.wall_missed += status.wall_pairs_missed;
-    return status_of(status);
+    return agreed_status(status);
   }
   void refresh_halo() {
     in_use_ = Structures::none;
@@ -372,35 +373,11 @@ class Solver : public DeviceSolver {
     return halo_ ? halo_->ranks().any(grown) : grown;
   }
 
-  Status status_of(const DeviceStatus& from) const {
-    const Status own = own_status_of(from);
+  Status agreed_status(const DeviceStatus& from) const {
+    Status own = status_of(from);
     if (!halo_) return own;
-    // All ranks end with the same one: what came first, of the particle with the smallest id.
-    Status first;
-    for (const Status& s : halo_->ranks().all(own)) {
-      first.bits |= s.bits;
-      if (s.particle < 0) continue;
-      if (first.particle < 0 || std::pair(s.substep, s.particle) < std::pair(first.substep, first.particle)) {
-        first.substep = s.substep;
-        first.particle = s.particle;
-      }
-    }
-    return first;
-  }
-  Status own_status_of(const DeviceStatus& from) const {
-    Status status;
-    const unsigned long long first = std::min({from.non_finite, from.escaped, from.missed_pair});
-    if (from.non_finite != DeviceStatus::none) status.bits |= Status::non_finite;
-    if (from.escaped != DeviceStatus::none) status.bits |= Status::escaped;
-    if (from.missed_pair != DeviceStatus::none) status.bits |= Status::missed_pair;
-    // Nobody grew what was too short: whatever came out of it is not to be used.
-    if (from.longest_list != 0 || from.tile_bytes != 0) status.bits |= Status::capacity;
-    if (first != DeviceStatus::none) {
-      status.particle = static_cast<std::int64_t>(first & 0xFFFFFFFFull);
-      if (halo_) status.particle = halo_->problem_id(status.particle);
-      status.substep = static_cast<std::int64_t>(first >> 32);
-    }
-    return status;
+    if (own.particle >= 0) own.particle = halo_->problem_id(own.particle);
+    return first_of(halo_->ranks().all(own));
   }
 
   Stream stream_;
