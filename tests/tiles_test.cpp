@@ -2,6 +2,7 @@
 /// Lists in tiles: what a long advance leaves is complete, tiles that find no room give way to other lists, and a run
 /// that is resumed keeps its bits either way.
 #include "oracle/files/fixture_file.hpp"
+#include "oracle/solution/force_free.hpp"
 #include "tests/backend_variants.hpp"
 
 #include "reference/sampling.hpp"
@@ -54,6 +55,21 @@ TEST_P(Tiles, MissNoNeighborAfterManyRebuilds) {
     EXPECT_TRUE(listed.fluid_neighbor_id_sum == found.fluid_neighbor_id_sum) << name;
     EXPECT_TRUE(listed.wall_neighbor_count == found.wall_neighbor_count) << name;
     EXPECT_TRUE(listed.wall_neighbor_id_sum == found.wall_neighbor_id_sum) << name;
+  }
+}
+
+/// Memory tells whether they are in use.
+TEST_P(Tiles, ServeSmallScenesWhateverTheirParticlesWeigh) {
+  for (const std::string name : {"pour-4k-stream", "hostile-fast-wall", "hostile-impact"}) {
+    Fixture f = fixture(name);
+    for (const bool forces : {true, false}) {
+      if (!forces) f.scene = force_free(f.scene);  // as contact is checked
+      const auto bytes = [&](const std::string& choice) {
+        return loaded(choice, f, f.state)->neighbor_stats().device_bytes;
+      };
+      EXPECT_NE(bytes("list:tiles=on:skin=0.2"), bytes("list:tiles=off:skin=0.2:threads_per_particle=8"))
+          << name << " " << forces;
+    }
   }
 }
 

@@ -27,12 +27,11 @@ class NeighborList {
     walls_ = walls;
     const bool at_once = o_.launch == SolverOptions::Launch::automatic && !o_.check_completeness && from_cells() &&
                          criterion() != Criterion::relative && !a.on_ranks();
-    const float spacing = std::cbrt(c.mass / c.rest_density);
     tiles_.clear();
     const bool tiled = at_once && wants_tiles() && !c.any_periodic &&
                        (o_.threads_per_particle == 0 || o_.threads_per_particle == TileMemory::lanes) &&
                        tiles_.serve(persistent_tiles_kernel, n_, a.sentinel, a.containers,
-                                    (1 + (o_.skin >= 0 ? o_.skin : widest_of_tiles)) * c.H / spacing);
+                                    (1 + (o_.skin >= 0 ? o_.skin : widest_of_tiles)) * c.H / c.spacing);
     const double skin = o_.skin >= 0 ? o_.skin : tiled ? widest_of_tiles : widest;
     widest_skin_ = static_cast<float>(skin) * c.H;
     const float reach = c.H + widest_skin_;

@@ -128,6 +128,7 @@ Constants make_constants(const Scene& scene) {
   c.inverse_h = static_cast<float>(1.0 / h);
   c.h2_soft = static_cast<float>(0.01 * h * h);
   const FluidProperties& fluid = scene.fluid;
+  c.spacing = static_cast<float>(scene.particle_spacing);
   c.mass = static_cast<float>(scene.particle_mass());
   c.rest_density = static_cast<float>(fluid.rest_density);
   c.inverse_rest_density = static_cast<float>(1.0 / fluid.rest_density);

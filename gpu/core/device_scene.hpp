@@ -27,6 +27,7 @@ struct Constants {
   float H, H2, inverse_h, h2_soft;  // m, m², 1/m, 0.01 h² in m²
   float w_norm, g_norm;             // of W (mueller2003: of poly6) and of G (spiky)
   float g_near[2], g_far;           // cubic_spline's G: g_near[0] − g_near[1] q, g_far (2 − q)²/r
+  float spacing;                    // dx, m
   float mass, rest_density, inverse_rest_density;
   float stiffness;   // B, Pa
   int eos_exponent;  // 7 or 1

@@ -262,7 +262,7 @@ fault("wall-a-substep-late", "in a run walls are placed one substep late",
       "what == WallsFor::force ? a.poses_before() : a.poses_after();",
       "what == WallsFor::force ? a.poses_before() : a.poses_after();\n"
       "    if (ON && poses > a.poses) poses -= a.containers;",
-      "trajectory", "list")
+      "trajectory", "list:tiles=off")
 fault("list-ignores-walls", "lists are kept however far walls move",
       "&& wall_displacement + rounding_of(x) <= most", "&& (ON || wall_displacement + rounding_of(x) <= most)",
       "advanced", "list", fixture="hostile-fast-wall")
