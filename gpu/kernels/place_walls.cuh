@@ -58,9 +58,9 @@ DECANT_DEVICE void place_wall(const ParticleArrays& a, const Walls& w, int slot,
   place_wall_for_force(a, w, slot, x, id, pose);
 }
 
-/// Wall particles to their place in the world: before the first substep, when the status says nothing yet; at the end of
-/// the substep under way, for densities and forces; or in two halves, each beside a pass that does not read what it writes: for
-/// densities beside the forces of the substep that ends, for forces beside the densities of the next one.
+/// Wall particles to their place in the world: before the first substep, when the status says nothing yet; at the end
+/// of the substep under way, for densities and forces; or in two halves, each beside a pass that does not read what it
+/// writes: for densities beside the forces of the substep that ends, for forces beside the densities of the next one.
 enum class WallsFor { start, both, density, force };
 template <WallsFor what>
 struct PlaceWalls {
