@@ -186,6 +186,20 @@ TEST(Campaign, ShrinksAFaultToWhatShowsItAndWritesThatDown) {
   EXPECT_NO_THROW(check_scene(fixture.scene, "found"));
 }
 
+TEST(Campaign, StopsMinimisingWhenItIsToldToAndWritesWhatItHas) {
+  const TemporaryFolder folder;
+  Settings s = settings_of(20, {"fields"});
+  s.backends = {"reference"};
+  s.failures = folder / "failing";
+  std::atomic<int> asked{0};
+  s.stop = [&] { return ++asked > 25; };  // later than for the first case that fails
+  const Campaign c = run_campaign(s, with_a_fault);
+  ASSERT_EQ(c.counterexamples.size(), 1u);
+  EXPECT_GT(c.counterexamples[0].tries, 0);
+  EXPECT_LT(c.counterexamples[0].tries, 25);
+  EXPECT_TRUE(std::filesystem::exists(c.counterexamples[0].file));
+}
+
 TEST(Campaign, EndsWhereItIsToldToAndKeepsWhatItHas) {
   Settings s = settings_of(-1, {"fields"});
   std::atomic<int> asked{0};

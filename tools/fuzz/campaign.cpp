@@ -130,7 +130,7 @@ class Running {
     found.seed = seed;
     found.fuzz_case = fuzz_case;
     found.outcome = outcome;
-    found = minimise(tester, std::move(found), s_.minimise_tries, s_.minimise_seconds);
+    found = minimise(tester, std::move(found), s_.minimise_tries, s_.minimise_seconds, s_.stop);
     const std::lock_guard lock(mutex_);
     if (!s_.failures.empty()) found.file = write_counterexample(s_.failures, found);
     all_.counterexamples.push_back(std::move(found));

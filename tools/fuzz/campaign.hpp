@@ -77,8 +77,9 @@ struct Counterexample {
 };
 
 /// Fewer particles, then smaller numbers, as long as the same property of the same backend fails.
-/// Ends after so many tries or seconds.
-Counterexample minimise(Tester& tester, Counterexample found, int most_tries, double seconds);
+/// Ends after so many tries or seconds, or as soon as stop() says so, with what is smallest by then.
+Counterexample minimise(Tester& tester, Counterexample found, int most_tries, double seconds,
+                        const std::function<bool()>& stop = {});
 
 /// Scores of a property of a backend over all cases.
 struct PropertyStatistics {

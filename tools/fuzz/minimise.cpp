@@ -13,11 +13,12 @@ namespace {
 
 class Minimising {
  public:
-  Minimising(Tester& tester, Counterexample found, int most_tries, double seconds)
+  Minimising(Tester& tester, Counterexample found, int most_tries, double seconds, const std::function<bool()>& stop)
       : tester_(tester),
         best_(std::move(found)),
         most_(most_tries),
-        end_(Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds))) {}
+        end_(Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds))),
+        stop_(stop) {}
 
   Counterexample run() {
     best_.found_particles = best_.fuzz_case.points.size();
@@ -36,7 +37,8 @@ class Minimising {
 
   /// Takes the candidate where it fails as the one found does.
   bool take(const Case& candidate) {
-    if (candidate == best_.fuzz_case || best_.tries >= most_ || Clock::now() >= end_) return false;
+    if (candidate == best_.fuzz_case || best_.tries >= most_ || Clock::now() >= end_ || (stop_ && stop_()))
+      return false;
     ++best_.tries;
     Outcome outcome;
     try {
@@ -149,12 +151,14 @@ class Minimising {
   Counterexample best_;
   int most_;
   Clock::time_point end_;
+  const std::function<bool()>& stop_;
 };
 
 }  // namespace
 
-Counterexample minimise(Tester& tester, Counterexample found, int most_tries, double seconds) {
-  return Minimising(tester, std::move(found), most_tries, seconds).run();
+Counterexample minimise(Tester& tester, Counterexample found, int most_tries, double seconds,
+                        const std::function<bool()>& stop) {
+  return Minimising(tester, std::move(found), most_tries, seconds, stop).run();
 }
 
 }  // namespace decant::fuzz
