@@ -41,9 +41,9 @@ TEST_P(Tiles, MissNoNeighborAfterManyRebuilds) {
     const Fixture f = fixture(name);
     const auto tiles = loaded("list:tiles=on:skin=0.05", f, f.state), hash = loaded("hash", f, f.state);
     const auto before = tiles->neighbor_stats().rebuilds;
-    ASSERT_TRUE(tiles->advance(50).ok()) << name;
-    ASSERT_TRUE(hash->advance(50).ok()) << name;
-    EXPECT_GT(tiles->neighbor_stats().rebuilds - before, 7) << name;
+    ASSERT_TRUE(tiles->advance(100).ok()) << name;
+    ASSERT_TRUE(hash->advance(100).ok()) << name;
+    EXPECT_GT(tiles->neighbor_stats().rebuilds - before, 15) << name;
     ParticleState state, other;
     tiles->read(state);
     hash->read(other);
