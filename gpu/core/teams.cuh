@@ -171,19 +171,6 @@ DECANT_DEVICE void for_each_thread(int n, Body&& body) {
                    [&body](int i) { body(i); });
 #endif
 }
-/// body() once, by the last block that gets here: it sees what all have written before.
-/// \param blocks_ended  0 before and after
-template <class Body>
-DECANT_DEVICE void by_last_block([[maybe_unused]] int* blocks_ended, Body&& body) {
-#ifdef __CUDACC__
-  __threadfence();
-  __syncthreads();
-  if (threadIdx.x != 0 || atomicAdd(blocks_ended, 1) != static_cast<int>(gridDim.x) - 1) return;
-  *blocks_ended = 0;
-  __threadfence();
-#endif
-  body();
-}
 /// … and body(team) by the threads of each particle, of n.
 template <class Team, class Body>
 DECANT_DEVICE void for_each_team(int n, const Body& body) {
@@ -210,6 +197,20 @@ DECANT_DEVICE void for_each_team(int n, const Body& body) {
     });
   }
 #endif
+}
+
+/// body() once, by the last block that gets here: it sees what all have written before.
+/// \param blocks_ended  0 before and after
+template <class Body>
+DECANT_DEVICE void by_last_block([[maybe_unused]] int* blocks_ended, Body&& body) {
+#ifdef __CUDACC__
+  __threadfence();
+  __syncthreads();
+  if (threadIdx.x != 0 || atomicAdd(blocks_ended, 1) != static_cast<int>(gridDim.x) - 1) return;
+  *blocks_ended = 0;
+  __threadfence();
+#endif
+  body();
 }
 
 /// Blocks of a persistent grid, at most: a scan has a sum for each.
