@@ -256,27 +256,26 @@ void place(const Forms& f, const Scene& scene, const Walls& walls, double time, 
   }
 }
 
-/// While it lives, numbers below 2⁻¹²⁶ are 0 as operands and as results.
+/// While it lives, numbers below 2⁻¹²⁶ are 0 as operands and as results, where the host can.
+#ifdef __SSE2__
 class FlushToZero {
  public:
-  explicit FlushToZero([[maybe_unused]] bool flushed) {
-#ifdef __SSE2__
+  explicit FlushToZero(bool flushed) : before_(_mm_getcsr()) {
     if (flushed) _mm_setcsr(before_ | 0x8040);  // FTZ, DAZ
-#endif
   }
   FlushToZero(const FlushToZero&) = delete;
   FlushToZero& operator=(const FlushToZero&) = delete;
-  ~FlushToZero() {
-#ifdef __SSE2__
-    _mm_setcsr(before_);
-#endif
-  }
+  ~FlushToZero() { _mm_setcsr(before_); }
 
  private:
-#ifdef __SSE2__
-  unsigned before_ = _mm_getcsr();
-#endif
+  unsigned before_;
 };
+#else
+struct FlushToZero {
+  explicit FlushToZero(bool) {}
+  ~FlushToZero() {}
+};
+#endif
 
 }  // namespace
 

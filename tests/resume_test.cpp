@@ -13,8 +13,6 @@
 #include <gtest/gtest.h>
 
 #include <memory>
-#include <ostream>
-#include <vector>
 
 namespace decant {
 namespace {
