@@ -9,15 +9,19 @@
 namespace decant::gpu {
 namespace {
 
-/// The rows of cells around a team's particle, in shared memory: each is looked up by one of its threads.
-template <class Team>
+/// Rows of cells around a team's particle, in shared memory: each is looked up by one of its threads.
+template <int lanes>
 class RowRanges {
  public:
+  /// One thread alone has both parts of rows that go around the table's end, of half of the rows at a time.
+  static constexpr int most = lanes == 1 ? 2 * ((CellTable::rows + 1) / 2) : CellTable::rows;
+  static constexpr int stride = most / 2 * 2 + 1;  // odd, for different banks
+
   /// Behind the staging buffers.
-  DECANT_DEVICE int2& row(int r) {
+  DECANT_DEVICE int2& operator[](int r) {
 #ifdef __CUDACC__
     int2* all = reinterpret_cast<int2*>(shared_memory() + static_cast<int>(blockDim.x) * StagingBuffer::stride);
-    return all[static_cast<int>(threadIdx.x) / Team::lanes * CellTable::rows + r];
+    return all[static_cast<int>(threadIdx.x) / lanes * stride + r];
 #else
     return all_[r];
 #endif
@@ -25,7 +29,7 @@ class RowRanges {
 
 #ifndef __CUDACC__
  private:
-  int2 all_[CellTable::rows];
+  int2 all_[most];
 #endif
 };
 
@@ -44,8 +48,9 @@ struct BuildList {
 
   /// Of a block of so many threads, so many of them per particle.
   static constexpr std::size_t shared_bytes(int lanes, int threads) {
+    const int rows = lanes == 1 ? RowRanges<1>::stride : RowRanges<2>::stride;
     return static_cast<std::size_t>(threads * StagingBuffer::stride +
-                                    threads / lanes * CellTable::rows * static_cast<int>(sizeof(int2)));
+                                    threads / lanes * rows * static_cast<int>(sizeof(int2)));
   }
 
   template <class Team>
@@ -106,24 +111,16 @@ struct BuildList {
   DECANT_DEVICE void fluid(Team& team, ListWriter& list) const {
     const int bucket = candidates.all_fluid ? 0 : candidates.table.bucket_of(list.x);
     const bool twice = !candidates.all_fluid && candidates.table.goes_around(bucket);
-    RowRanges<Team> ranges;
-    // One thread alone visits candidates in an order that no table's size changes: ranks have tables of their own.
-    constexpr int turns = Team::lanes == 1 ? CellTable::rows : 2;
+    RowRanges<Team::lanes> rows;
 #pragma unroll 1
-    for (int turn = 0; turn < (twice ? turns : 1); ++turn) {
-      for (int r = team.lane(); r < CellTable::rows; r += Team::lanes) {
-        if (candidates.all_fluid) {
-          ranges.row(r) = make_int2(0, r == 0 ? a.n : 0);
-          continue;
-        }
-        ranges.row(r) = row_of_turn<Team::lanes>(bucket, r, twice, turn);
-      }
+    for (int turn = 0; turn < (twice ? 2 : 1); ++turn) {
+      const int found = find_rows(team, rows, bucket, twice, turn);
       team.sync();
       int r = -1, k = 0, end = 0;
       const auto advance = [&]() DECANT_INLINE {
         k += batch * Team::lanes;
-        while (k >= end && ++r < CellTable::rows) {
-          const int2 run = ranges.row(r);
+        while (k >= end && ++r < found) {
+          const int2 run = rows[r];
           k = run.x + team.lane();
           end = run.y;
         }
@@ -132,33 +129,48 @@ struct BuildList {
       const auto step = [&](const float4(&now)[batch], float4(&next)[batch]) DECANT_INLINE {
         const int first = k, last = end;
         advance();
-        load<Team::lanes>(r < CellTable::rows ? k : 0, next);
+        load<Team::lanes>(r < found ? k : 0, next);
         send(list, batch);
 #pragma unroll
         for (int b = 0; b < batch; ++b) {
           const int j = first + b * Team::lanes;
           test(list, j, now[b], (j < last) & (j != list.i));
         }
-        return r < CellTable::rows;
+        return r < found;
       };
       advance();
       float4 even[batch], odd[batch];
-      load<Team::lanes>(r < CellTable::rows ? k : 0, even);
-      if (r < CellTable::rows)
+      load<Team::lanes>(r < found ? k : 0, even);
+      if (r < found)
 #pragma unroll 1
         while (step(even, odd) && step(odd, even)) {
         }
       team.sync();
     }
   }
-  /// Rows that go around the table's end have two parts: by one thread, row after row; else the first parts of all
-  /// rows and then the second ones, which waits for memory less often.
-  template <int lanes>
-  DECANT_DEVICE int2 row_of_turn(int bucket, int r, bool twice, int turn) const {
-    const bool alone = lanes == 1 && twice;
-    if (alone && r > 1) return make_int2(0, 0);
-    const CellTable::Range row = candidates.table.row<periodic>(bucket, alone ? turn : r);
-    return (alone ? r : turn) == 0 || !twice ? make_int2(row.begin, row.end) : make_int2(row.begin2, row.end2);
+  /// The rows of a turn; their number. Rows that go around the table's end have two parts: first parts of all rows in
+  /// the first turn, second ones in the second. One thread alone visits candidates in an order that no table's size
+  /// changes, for ranks have tables of their own: row by row, half of them in each turn.
+  template <class Team>
+  DECANT_DEVICE int find_rows(Team& team, RowRanges<Team::lanes>& rows, int bucket, bool twice, int turn) const {
+    if (candidates.all_fluid) {
+      rows[0] = make_int2(0, a.n);
+      return 1;
+    }
+    constexpr bool alone = Team::lanes == 1;
+    constexpr int half = (CellTable::rows + 1) / 2;
+    const int past = alone && twice && turn == 0 ? half : CellTable::rows;
+    int found = 0;
+    for (int r = alone ? turn * half : team.lane(); r < past; r += Team::lanes) {
+      const CellTable::Range row = candidates.table.row<periodic>(bucket, r);
+      const int2 first = make_int2(row.begin, row.end), second = make_int2(row.begin2, row.end2);
+      if (!alone) rows[r] = turn == 0 ? first : second;
+      else {
+        rows[found++] = first;
+        if (twice) rows[found++] = second;
+      }
+    }
+    return alone ? found : CellTable::rows;
   }
   template <int step>
   DECANT_DEVICE void load(int k, float4 (&to)[batch]) const {
