@@ -154,7 +154,7 @@ struct BuildList {
   template <class Team>
   DECANT_DEVICE int find_rows(Team& team, RowRanges<Team::lanes>& rows, int bucket, bool twice, int turn) const {
     if (candidates.all_fluid) {
-      rows[0] = make_int2(0, a.n);
+      if (team.is_leader()) rows[0] = make_int2(0, a.n);
       return 1;
     }
     constexpr bool alone = Team::lanes == 1;
