@@ -25,7 +25,7 @@ struct Settings {
   std::string list, folder = "fixtures", executor = "host", out, equivalent;
   std::vector<std::string> only;
   int jobs = 2;
-  bool verbose = false;
+  bool verbose = false, named_checks = false;
   std::int64_t fuzz = 0;  // problems at most; 0: the catalogue's own fixtures
   std::uint64_t first_seed = 1;
 };
@@ -34,6 +34,12 @@ int finish(const Settings& s, const std::string& table, bool passes) {
   std::cout << table;
   if (!s.out.empty()) std::ofstream(s.out) << table;
   return passes ? 0 : 1;
+}
+
+/// What has to run for a check to give its rows.
+CheckSelection selection_of(const std::string& check) {
+  if (check.empty() || check == "run") return all_checks();
+  return all_checks().contains(check) ? CheckSelection{check} : CheckSelection{"fields"};
 }
 
 /// The catalogue: each fault against the check that is there for it.
@@ -47,7 +53,8 @@ int run_catalogue(const Settings& s, const nlohmann::json& faults, Executor exec
       ++not_run;
       continue;
     }
-    trials.push_back({number(f), text(f, "backend"), text(f, "fixture")});
+    trials.push_back({number(f), text(f, "backend"), text(f, "fixture"),
+                      s.named_checks ? selection_of(text(f, "check")) : all_checks()});
     planted.push_back(f);
   }
   const auto prepared = prepare_all(trials, s.folder);
@@ -207,6 +214,7 @@ int main(int argc, char** argv) {
   app.add_option("--executor", s.executor, "host or cuda")->check(CLI::IsMember({"host", "cuda"}));
   app.add_option("--jobs", s.jobs, "processes at a time")->capture_default_str();
   app.add_option("--only", s.only, "names of faults");
+  app.add_flag("--named-checks", s.named_checks, "run of each fault's checks only the one that is there for it");
   app.add_option("--equivalent", s.equivalent, "mutations that change nothing, with reasons");
   app.add_option("--fuzz", s.fuzz, "find each fault by fuzzing alone, in so many problems at most");
   app.add_option("--seed", s.first_seed, "of the first problem");
