@@ -16,7 +16,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
+#include <numeric>
 
 namespace decant::fuzz {
 namespace {
@@ -126,6 +128,7 @@ TEST(Campaign, FindsNothingInWhatIsRight) {
   for (const PropertyStatistics& t : c.statistics) {
     EXPECT_EQ(t.failed, 0) << t.property << " " << t.backend << ": seed " << t.worst_seed;
     EXPECT_GT(t.asked, 0);
+    EXPECT_LE(t.worst, 1) << t.property << " " << t.backend << ": seed " << t.worst_seed;
     asked.insert(t.property);
   }
   EXPECT_EQ(asked, all_properties());
@@ -146,7 +149,27 @@ TEST(Campaign, IsTheSameWithAnyNumberOfThreads) {
     EXPECT_EQ(one.statistics[k].worst, two.statistics[k].worst);
     EXPECT_EQ(one.statistics[k].worst_seed, two.statistics[k].worst_seed);
     EXPECT_EQ(one.statistics[k].histogram, two.statistics[k].histogram);
+    EXPECT_EQ(one.statistics[k].stepwise, two.statistics[k].stepwise);
+    EXPECT_EQ(one.statistics[k].stepwise_seed, two.statistics[k].stepwise_seed);
   }
+}
+
+/// A run that leaves its bound at a contact says nothing of how near the others come to theirs.
+TEST(Campaign, CountsApartWhatIsRightStepByStep) {
+  Settings s = settings_of(2, {"containment"});
+  s.first_seed = 3003939;
+  s.every_case = true;
+  const Campaign c = run_campaign(s, on_host);
+  ASSERT_EQ(c.statistics.size(), 1u);
+  const PropertyStatistics& t = c.statistics[0];
+  EXPECT_EQ(t.asked, 2);
+  EXPECT_EQ(t.failed, 0);
+  EXPECT_EQ(t.stepwise, 1) << "the second has a particle between a wall and the floor, if cases are drawn as before";
+  EXPECT_EQ(t.stepwise_seed, 3003940);
+  EXPECT_LE(t.worst, 1);
+  EXPECT_EQ(std::accumulate(t.histogram.begin(), t.histogram.end(), std::int64_t{0}), t.asked - t.stepwise);
+  const std::string table = campaign_table(c);
+  EXPECT_NE(table.find("First seeds: containment hash 3003940\n"), std::string::npos) << table;
 }
 
 /// The reference with one wrong density wherever three particles or more are there.
@@ -231,10 +254,21 @@ TEST(Campaign, ReportsAreAsDocumentedAndMerge) {
   const auto a = folder / "a.h5", b = folder / "b.h5", all = folder / "all.h5";
   const BackendInfo info{"hash", "", "host", "here", "fp32"};
   Campaign first = run_campaign(s, on_host);
+  PropertyStatistics apart;
+  apart.backend = "hash";
+  apart.property = "mass";
+  apart.asked = apart.stepwise = 1;
+  apart.stepwise_seed = 5;
+  first.statistics.push_back(apart);
   write_campaign(a, first, info);
   s.first_seed = 7;
   s.backends = {"reference"};
-  write_campaign(b, run_campaign(s, with_a_fault), info);
+  Campaign second = run_campaign(s, with_a_fault);
+  apart.asked = 9;
+  apart.stepwise = 2;
+  apart.stepwise_seed = 8;
+  second.statistics.push_back(apart);
+  write_campaign(b, second, info);
   const std::string tools = DECANT_SOURCE_DIR "/tools/python/";
   EXPECT_EQ(test::run_python({tools + "merge_fuzz.py", a.string(), b.string(), "--out", all.string()}), 0);
   for (const auto& file : {a, b, all})
@@ -242,6 +276,11 @@ TEST(Campaign, ReportsAreAsDocumentedAndMerge) {
   const Hdf5Reader merged(all);
   EXPECT_EQ(merged.integer_attribute("/", "cases"), 12);
   EXPECT_EQ(merged.integers("/counterexamples/seed").size(), 1);
+  const auto properties = merged.strings("/statistics/property");
+  const auto mass = std::find(properties.begin(), properties.end(), "mass") - properties.begin();
+  ASSERT_LT(mass, std::ssize(properties));
+  EXPECT_EQ(merged.integers("/statistics/stepwise")[mass], 3);
+  EXPECT_EQ(merged.integers("/statistics/stepwise_seed")[mass], 5);
   EXPECT_EQ(test::run_python({tools + "merge_fuzz.py", a.string(), a.string(), "--out", all.string()}, true), 2);
 }
 

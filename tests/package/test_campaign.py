@@ -31,6 +31,19 @@ def test_local_campaign_is_one_report(tmp_path, sequential, capfd):
     assert capfd.readouterr().err == ""
 
 
+def test_what_is_right_step_by_step_is_counted_once(tmp_path):
+    """Seed 3003940: a particle between a wall and the floor; see Campaign.CountsApartWhatIsRightStepByStep."""
+    asked = {**ASKED, "properties": ["containment"], "seed": 3003938, "cases": 6, "block": 2}
+    result = decant.campaign.fuzz(**asked, folder=tmp_path / "c", workers=2, quiet=True)
+    result.require()
+    with h5py.File(result.report) as report:
+        rows = report["statistics"]
+        assert rows["stepwise"][:].tolist() == [1] and rows["stepwise_seed"][:].tolist() == [3003940]
+        assert rows["asked"][0] == 1 + sum(int(rows[f"score_bin_{k:02}"][0]) for k in range(12))
+    text = (tmp_path / "c" / "report.txt").read_text()
+    assert " stepwise " in text and text.rstrip().endswith("First seeds: containment hash 3003940")
+
+
 @pytest.fixture(scope="module")
 def done(tmp_path_factory, sequential):
     """A small campaign that is done."""

@@ -106,6 +106,11 @@ class Running {
       counted.property = o.property;
       ++counted.asked;
       counted.failed += !o.holds;
+      if (o.stepwise) {
+        const auto here = static_cast<std::int64_t>(seed);
+        if (counted.stepwise++ == 0 || here < counted.stepwise_seed) counted.stepwise_seed = here;
+        continue;
+      }
       ++counted.histogram[bin_of(o.holds ? o.score : 2)];
       if (o.score < counted.worst || (o.score == counted.worst && seed >= counted.worst_seed)) continue;
       counted.worst = o.score;

@@ -33,9 +33,10 @@ const std::vector<Property>& properties();
 struct Outcome {
   std::string backend, property;
   bool holds = true;
-  double score = 0;    // largest |error| / tolerance; 0 where the property is yes or no
-  std::string field;   // and what it is of
-  std::string reason;  // in words, where it does not hold
+  double score = 0;       // largest |error| / tolerance; 0 where the property is yes or no
+  std::string field;      // and what it is of
+  std::string reason;     // in words, where it does not hold
+  bool stepwise = false;  // outside its bound, and holds all the same: each substep is right from the state before
 };
 
 /// Makes the backend of a choice on the command line.
@@ -84,11 +85,12 @@ Counterexample minimise(Tester& tester, Counterexample found, int most_tries, do
 /// Scores of a property of a backend over all cases.
 struct PropertyStatistics {
   std::string backend, property;
-  std::int64_t asked = 0, failed = 0;
-  double worst = 0;
+  std::int64_t asked = 0, failed = 0, stepwise = 0;  // the last ones hold
+  std::int64_t stepwise_seed = -1;                   // the smallest; none: -1
+  double worst = 0;                                  // of all but these
   std::uint64_t worst_seed = 0;
   std::string worst_field;
-  std::array<std::int64_t, 12> histogram{};  // of log2(score) from ≤ −10 to > 0
+  std::array<std::int64_t, 12> histogram{};  // of them too, by log2(score) from ≤ −10 to 0, and failures
 };
 
 struct Settings {

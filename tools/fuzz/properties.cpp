@@ -120,9 +120,9 @@ Outcome sequence(Backend& backend, const std::string& name, const Fixture& f, co
     o.score = score;
     o.field = divergence_names[k];
   }
-  if (o.score <= 1 || each_step_holds(backend, f, walls, plan, true)) return o;
-  o.holds = false;
-  o.reason = fmt::format("{}: score {:.3g}", o.field, o.score);
+  if (o.score <= 1) return o;
+  o.holds = o.stepwise = each_step_holds(backend, f, walls, plan, true);
+  if (!o.holds) o.reason = fmt::format("{}: score {:.3g}", o.field, o.score);
   return o;
 }
 
@@ -292,7 +292,7 @@ std::vector<Outcome> Tester::outcomes(const Fixture& drawn, std::uint64_t seed, 
       for (const auto& property : checks) {
         Outcome o = trouble.empty() ? joined(name, property, rows) : failed(name, property.c_str(), trouble);
         if (follow_from_steps.contains(property) && !o.holds && trouble.empty())
-          o.holds = each_step_holds(backend(name), fixture, oracle.walls, {run_substeps}, false);
+          o.holds = o.stepwise = each_step_holds(backend(name), fixture, oracle.walls, {run_substeps}, false);
         all.push_back(std::move(o));
       }
     }

@@ -38,11 +38,20 @@ std::string campaign_table(const Campaign& c) {
     text +=
         fmt::format("{}{} {:.1f} %", k ? ", " : " ", tag_names[k],
                     100.0 * static_cast<double>(c.tags[k]) / static_cast<double>(std::max<std::int64_t>(c.cases, 1)));
-  text += fmt::format("\n\n{:<14} {:<24} {:>9} {:>7} {:>8} {:>10}  {}\n", "property", "backend", "asked", "failed",
-                      "worst", "seed", "of");
-  for (const PropertyStatistics& t : c.statistics)
-    text += fmt::format("{:<14} {:<24} {:>9} {:>7} {:>8.3f} {:>10}  {}\n", t.property, t.backend, t.asked, t.failed,
-                        t.worst, t.worst_seed, t.worst_field);
+  text += fmt::format("\n\n{:<14} {:<24} {:>9} {:>7} {:>8} {:>8} {:>10}  {}\n", "property", "backend", "asked",
+                      "failed", "stepwise", "worst", "seed", "of");
+  std::string stepwise;
+  for (const PropertyStatistics& t : c.statistics) {
+    text += fmt::format("{:<14} {:<24} {:>9} {:>7} {:>8} {:>8.3f} {:>10}  {}\n", t.property, t.backend, t.asked,
+                        t.failed, t.stepwise, t.worst, t.worst_seed, t.worst_field);
+    if (t.stepwise > 0)
+      stepwise += fmt::format("{}{} {} {}", stepwise.empty() ? "" : ", ", t.property, t.backend, t.stepwise_seed);
+  }
+  if (!stepwise.empty())
+    text +=
+        "\nstepwise: of those asked, runs that end outside their bound and hold all the same, since each substep is\n"
+        "right from the state before; not in worst. First seeds: " +
+        stepwise + "\n";
   for (const Counterexample& f : c.counterexamples)
     text += fmt::format(
         "\nseed {}: {} does not hold for {}\n  {}\n  minimised in {} tries from {} particles to {}\n{}", f.seed,
@@ -53,7 +62,7 @@ std::string campaign_table(const Campaign& c) {
 
 void write_campaign(const std::filesystem::path& file, const Campaign& c, const BackendInfo& backend) {
   Hdf5Writer out(file);
-  out.attribute("/", "decant_fuzz", 2);
+  out.attribute("/", "decant_fuzz", 3);
   out.attribute("/", "executor", backend.executor);
   out.attribute("/", "device", backend.device);
   out.attribute("/", "first_seed", static_cast<std::int64_t>(c.first_seed));
@@ -68,16 +77,20 @@ void write_campaign(const std::filesystem::path& file, const Campaign& c, const 
   out.strings("/statistics/backend", texts(c.statistics, [](const T& t) { return t.backend; }));
   out.integers("/statistics/asked", whole(c.statistics, [](const T& t) { return t.asked; }));
   out.integers("/statistics/failed", whole(c.statistics, [](const T& t) { return t.failed; }));
+  out.integers("/statistics/stepwise", whole(c.statistics, [](const T& t) { return t.stepwise; }),
+               "cases outside their bound that hold: each substep is right from the state before");
+  out.integers("/statistics/stepwise_seed", whole(c.statistics, [](const T& t) { return t.stepwise_seed; }),
+               "the smallest; none: -1");
   Eigen::VectorXd worst(static_cast<Eigen::Index>(c.statistics.size()));
   for (std::size_t k = 0; k < c.statistics.size(); ++k) worst[static_cast<Eigen::Index>(k)] = c.statistics[k].worst;
-  out.vector("/statistics/worst", worst, "1", "largest |error| / tolerance");
+  out.vector("/statistics/worst", worst, "1", "largest |error| / tolerance of all but those stepwise right");
   out.integers("/statistics/worst_seed", whole(c.statistics, [](const T& t) { return t.worst_seed; }));
   out.strings("/statistics/worst_field", texts(c.statistics, [](const T& t) { return t.worst_field; }));
   for (std::size_t bin = 0; bin < PropertyStatistics{}.histogram.size(); ++bin)
     out.integers(fmt::format("/statistics/score_bin_{:02}", bin),
                  whole(c.statistics, [bin](const T& t) { return t.histogram[bin]; }),
                  bin == 0    ? "scores up to 2^-10"
-                 : bin == 11 ? "scores above 1, and failures"
+                 : bin == 11 ? "failures"
                              : "scores up to 2^(bin - 10)");
   using F = Counterexample;
   out.integers("/counterexamples/seed", whole(c.counterexamples, [](const F& f) { return f.seed; }));

@@ -14,7 +14,8 @@ import h5py
 import numpy as np
 
 # Of a schema of `fuzz`: coverage tags, statistics per property and backend, counterexamples.
-GROUPS = {1: ("classes", "tallies", "findings"), 2: ("tags", "statistics", "counterexamples")}
+_NOW = ("tags", "statistics", "counterexamples")
+GROUPS = {1: ("classes", "tallies", "findings"), 2: _NOW, 3: _NOW}
 
 
 class JoinError(ValueError):
@@ -168,8 +169,11 @@ class FuzzReport(Report):
             self.rows[key] = row
             return
         for name in row:
-            if name in ("asked", "failed") or name.startswith("score_"):
+            if name in ("asked", "failed", "stepwise") or name.startswith("score_"):
                 known[name] += row[name]
+        if row.get("stepwise"):
+            seeds = [r["stepwise_seed"] for r in (known, row) if r["stepwise_seed"] >= 0]
+            known["stepwise_seed"] = min(seeds)
         # Of equal scores the smallest seed counts, as in one campaign.
         if (-row["worst"], row["worst_seed"]) < (-known["worst"], known["worst_seed"]):
             known.update({name: row[name] for name in ("worst", "worst_seed", "worst_field")})

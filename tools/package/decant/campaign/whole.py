@@ -82,12 +82,25 @@ def fuzz_text(report: FuzzReport) -> str:
     first = min(begin for begin, _, _ in report.ranges)
     lines = [f"{report.cases} cases of seeds {first} to {first + report.cases - 1} in {len(report.ranges)} blocks; "
              f"{report.undecidable} with pairs so near H that fp32 cannot tell who is a neighbor", "",
-             f"{'property':14} {'backend':24} {'asked':>9} {'failed':>7} {'worst':>8} {'seed':>10}  of"]  # fmt: skip
+             f"{'property':14} {'backend':24} {'asked':>9} {'failed':>7} {'stepwise':>8} {'worst':>8} "
+             f"{'seed':>10}  of"]  # fmt: skip
     for key in sorted(report.rows):
         row = report.rows[key]
         text = f"{row['property'].decode():14} {row['backend'].decode():24} {row['asked']:>9} {row['failed']:>7}"
+        text += f" {row.get('stepwise', '-'):>8}"
         text += f" {row['worst']:>8.3f} {row['worst_seed']:>10}  {row['worst_field'].decode()}"
         lines.append(text.rstrip())
+    stepwise = [
+        f"{row['property'].decode()} {row['backend'].decode()} {row['stepwise_seed']}"
+        for _, row in sorted(report.rows.items())
+        if row.get("stepwise")
+    ]
+    if stepwise:
+        lines += [
+            "",
+            "stepwise: of those asked, runs that end outside their bound and hold all the same, since each substep is",
+            f"right from the state before; not in worst. First seeds: {', '.join(stepwise)}",
+        ]
     for row in sorted(report.found.values(), key=lambda r: (r["seed"], r["backend"], r["property"])):
         lines += ["", f"fail: {row['property'].decode()} of {row['backend'].decode()}, seed {row['seed']}: "
                   f"{row['minimised_particles']} of {row['found_particles']} particles left",
