@@ -2,6 +2,7 @@
 /// Help that fits 80 columns, and answers to a command line with a slip in it.
 #include "tools/commands/help_text.hpp"
 
+#include "tests/built_files.hpp"
 #include "tests/shell_output.hpp"
 
 #include <gtest/gtest.h>
@@ -33,7 +34,7 @@ TEST(NearestName, IsTheOneThatWasMeantOrNone) {
 }
 
 test::ShellOutput answer_to(const std::string& arguments) {
-  return test::shell_output("'" DECANT_COMMAND "' " + arguments);
+  return test::shell_output(test::command() + " " + arguments);
 }
 
 TEST(Command, HelpOfEveryVerbFitsTheTerminalAndHasAnExample) {

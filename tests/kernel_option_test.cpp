@@ -3,6 +3,7 @@
 /// not.
 #include "oracle/checks/conform.hpp"
 #include "oracle/files/fixture_file.hpp"
+#include "tests/built_files.hpp"
 #include "tests/edited_reference.hpp"
 #include "tests/shell_output.hpp"
 #include "tools/commands/backend_choice.hpp"
@@ -55,7 +56,7 @@ TEST(KernelOption, LeavesARecordingWithThatKernelAsItIs) {
 }
 
 TEST(KernelOption, IsRefusedByName) {
-  const auto said = test::shell_output("'" DECANT_COMMAND "' conform hostile-crowd --kernel gauss");
+  const auto said = test::shell_output(test::command() + " conform hostile-crowd --kernel gauss");
   EXPECT_EQ(said.status, 2);
   EXPECT_NE(said.text.find("--kernel = gauss: one of cubic_spline, wendland_c2, mueller2003"), std::string::npos)
       << said.text;

@@ -5,6 +5,7 @@
 
 #include "oracle/solution/reference_backend.hpp"
 #include "reference/error.hpp"
+#include "tests/built_files.hpp"
 #include "tests/edited_reference.hpp"
 #include "tests/results_fixture.hpp"
 #include "tests/shell_output.hpp"
@@ -116,13 +117,13 @@ TEST_F(MeasuredReference, ThatIsNotFiniteIsNoReference) {
 }
 
 std::string conform(const std::string& arguments, int status) {
-  const test::ShellOutput out = test::shell_output("'" DECANT_COMMAND "' conform hostile-periodic-box " + arguments);
+  const test::ShellOutput out = test::shell_output(test::command() + " conform hostile-periodic-box " + arguments);
   EXPECT_EQ(out.status, status) << out.text;
   return out.text;
 }
 
 TEST_F(MeasuredReference, IsNamedOnTheCommandLine) {
-  const std::string said = conform("--oracle reference --backend 'plugin:" DECANT_PLUGINS "/all_pairs.so'", 0);
+  const std::string said = conform("--oracle reference --backend 'plugin:" + test::plugin_file("all_pairs") + "'", 0);
   EXPECT_NE(said.find("oracle: reference: 1 CPU core; bounds measured on 16 copies"), std::string::npos) << said;
   EXPECT_NE(conform("--oracle hash --backend list", 2).find("a reference in fp64; this one computes in fp32"),
             std::string::npos);

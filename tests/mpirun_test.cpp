@@ -3,6 +3,7 @@
 /// soon when one dies, and goes on with another number.
 #include "gpu/backends.hpp"
 #include "oracle/files/temporary_folder.hpp"
+#include "tests/built_files.hpp"
 #include "tests/file_bytes.hpp"
 #include "tests/shell_output.hpp"
 
@@ -25,7 +26,7 @@ namespace {
 using test::shell_output;
 using test::ShellOutput;
 
-const std::string command = "'" DECANT_COMMAND "'", program = DECANT_COMMAND;
+const std::string command = test::command(), program = test::command_file();
 
 ShellOutput on_ranks(int ranks, const std::string& arguments) {
   // Containers are root; machines of few cores are asked for more ranks than that.

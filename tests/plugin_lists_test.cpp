@@ -6,6 +6,7 @@
 #include "reference/error.hpp"
 #include "reference/neighbors.hpp"
 #include "reference/sampling.hpp"
+#include "tests/built_files.hpp"
 #include "tools/commands/backend_choice.hpp"
 #include "tools/drift/drift.hpp"
 
@@ -26,7 +27,7 @@ const Fixture& tilting() {
 }
 
 std::unique_ptr<Backend> started(const std::string& name, const std::string& options = {}) {
-  return make_plugin_backend(DECANT_PLUGINS "/" + name + ".so" + options);
+  return make_plugin_backend(test::plugin_file(name) + options);
 }
 
 drift::ListMaker lists_of(const std::string& name) {

@@ -11,6 +11,7 @@
 #include "reference/error.hpp"
 #include "reference/neighbors.hpp"
 #include "reference/sampling.hpp"
+#include "tests/built_files.hpp"
 #include "tools/commands/backend_choice.hpp"
 #include "tools/fuzz/campaign.hpp"
 
@@ -29,7 +30,7 @@
 namespace decant {
 namespace {
 
-std::string plugin_file(const std::string& name) { return DECANT_PLUGINS "/" + name + ".so"; }
+using test::plugin_file;
 std::unique_ptr<Backend> plugin_called(const std::string& name, const std::string& options = {}) {
   return make_plugin_backend(plugin_file(name) + options);
 }

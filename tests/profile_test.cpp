@@ -4,6 +4,7 @@
 #include "tools/commands/profile.hpp"
 
 #include "oracle/files/temporary_folder.hpp"
+#include "tests/built_files.hpp"
 #include "tests/shell_output.hpp"
 
 #include <gtest/gtest.h>
@@ -74,7 +75,7 @@ test::ShellOutput with_ncu(const std::string& script, const std::string& argumen
   const std::filesystem::path program = folder / "ncu";
   std::ofstream(program) << "#!/bin/sh\n" << script;
   std::filesystem::permissions(program, std::filesystem::perms::owner_all);
-  return test::shell_output("DECANT_NCU='" + program.string() + "' '" DECANT_COMMAND "' bench hostile-crowd " +
+  return test::shell_output("DECANT_NCU='" + program.string() + "' " + test::command() + " bench hostile-crowd " +
                             arguments + " --profile");
 }
 
@@ -85,8 +86,8 @@ TEST(Profile, SaysWhatNcuSays) {
   EXPECT_EQ(refused.status, 3);
   EXPECT_NE(refused.text.find("cannot profile brute: ==ERROR== ERR_NVGPUCTRPERM - no permission"), std::string::npos)
       << refused.text;
-  const auto absent = test::shell_output("DECANT_NCU=/nowhere/ncu '" DECANT_COMMAND
-                                         "' bench hostile-crowd --backend brute --executor host --profile");
+  const auto absent = test::shell_output("DECANT_NCU=/nowhere/ncu " + test::command() +
+                                         " bench hostile-crowd --backend brute --executor host --profile");
   EXPECT_EQ(absent.status, 3);
   EXPECT_NE(absent.text.find("/nowhere/ncu"), std::string::npos) << absent.text;
   const auto none = with_ncu("echo '==WARNING== No kernels were profiled.'\n", "--backend brute --executor host");

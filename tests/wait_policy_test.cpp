@@ -1,5 +1,6 @@
 /// \file
 /// The command's waiting threads sleep, unless its user says otherwise.
+#include "tests/built_files.hpp"
 #include "tests/shell_output.hpp"
 
 #include <gtest/gtest.h>
@@ -14,7 +15,7 @@ std::string output_of(const std::string& command) { return test::shell_output(co
 /// What the OpenMP runtime says that it does, the last time that it says so.
 std::string policy_told(const std::string& settings) {
   const std::string text = output_of("env -u OMP_WAIT_POLICY -u GOMP_SPINCOUNT OMP_DISPLAY_ENV=verbose " + settings +
-                                     " '" DECANT_COMMAND "' info");
+                                     " " + test::command() + " info");
   const auto at = text.rfind("OMP_WAIT_POLICY = '");
   if (at == std::string::npos) return "not told: " + text;
   const auto begin = at + std::string("OMP_WAIT_POLICY = '").size();
@@ -25,16 +26,16 @@ TEST(WaitPolicy, OfTheCommandIsPassiveAndTheRuntimeKnowsIt) { EXPECT_EQ(policy_t
 
 TEST(WaitPolicy, IsLeftToAUserWhoSetsIt) {
   EXPECT_EQ(policy_told("OMP_WAIT_POLICY=active"), "ACTIVE");
-  EXPECT_NE(
-      output_of("env -u OMP_WAIT_POLICY GOMP_SPINCOUNT=1000 '" DECANT_COMMAND "' info").find("OMP_WAIT_POLICY not set"),
-      std::string::npos);
+  EXPECT_NE(output_of("env -u OMP_WAIT_POLICY GOMP_SPINCOUNT=1000 " + test::command() + " info")
+                .find("OMP_WAIT_POLICY not set"),
+            std::string::npos);
 }
 
 TEST(WaitPolicy, ComesWithTheSameArgumentsAndExitStatus) {
   EXPECT_NE(
-      output_of("env -u OMP_WAIT_POLICY '" DECANT_COMMAND "' info --json").find("\"omp_wait_policy\": \"passive\""),
+      output_of("env -u OMP_WAIT_POLICY " + test::command() + " info --json").find("\"omp_wait_policy\": \"passive\""),
       std::string::npos);
-  EXPECT_NE(output_of("env -u OMP_WAIT_POLICY '" DECANT_COMMAND "' pour /nowhere.json --out x; echo =$?").find("=2"),
+  EXPECT_NE(output_of("env -u OMP_WAIT_POLICY " + test::command() + " pour /nowhere.json --out x; echo =$?").find("=2"),
             std::string::npos);
 }
 

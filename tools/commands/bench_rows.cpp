@@ -5,22 +5,13 @@
 #include "oracle/files/file_aside.hpp"
 #include "oracle/files/hdf5_io.hpp"
 #include "oracle/report/console_table.hpp"
-#include "version.hpp"
+#include "tools/common/build_provenance.hpp"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 namespace decant {
 namespace {
-
-const std::vector<std::pair<const char*, const char*>>& provenance() {
-  static const std::vector<std::pair<const char*, const char*>> all = {{"version", version},
-                                                                       {"git_revision", git_revision},
-                                                                       {"compiler", compiler},
-                                                                       {"flags", flags},
-                                                                       {"build_type", build_type}};
-  return all;
-}
 
 nlohmann::ordered_json to_json(const BenchRow& row) {
   nlohmann::ordered_json stages = nullptr;
@@ -72,7 +63,7 @@ std::string to_text(const BenchRow& row) {
 std::string bench_json(const std::vector<BenchRow>& rows, const std::string& interrupted) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array(), made_by;
   for (const BenchRow& row : rows) list.push_back(to_json(row));
-  for (const auto& [key, value] : provenance()) made_by[key] = value;
+  for (const auto& [key, value] : build_provenance()) made_by[key] = value;
   nlohmann::ordered_json all = {{"decant_bench", 1}, {"rows", list}, {"provenance", made_by}};
   if (!interrupted.empty()) all["interrupted"] = interrupted;
   return all.dump(2) + '\n';
@@ -124,7 +115,7 @@ void write_bench_hdf5(const std::string& file, const std::vector<BenchRow>& rows
       "neighbors found per second");
   real("substeps_per_rebuild", [](const BenchRow& r) { return r.substeps_per_rebuild; }, "1", "0: not told");
   real("device_bytes_per_particle", [](const BenchRow& r) { return r.device_bytes_per_particle; }, "B", "0: not told");
-  for (const auto& [key, value] : provenance()) out.attribute("/provenance", key, value);
+  for (const auto& [key, value] : build_provenance()) out.attribute("/provenance", key, value);
   out.commit();
 }
 

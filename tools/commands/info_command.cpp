@@ -3,7 +3,7 @@
 #include "gpu/backends.hpp"
 #include "tools/commands/backend_choice.hpp"
 #include "tools/commands/commands.hpp"
-#include "version.hpp"
+#include "tools/common/build_provenance.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -40,12 +40,13 @@ std::string wait_policy() {
 }
 
 nlohmann::ordered_json collect() {
+  const auto build = build_provenance();
   return {
-      {"version", version},
-      {"git_revision", git_revision},
-      {"build_type", build_type},
-      {"compiler", compiler},
-      {"flags", flags},
+      {"version", build.at("version")},
+      {"git_revision", build.at("git_revision")},
+      {"build_type", build.at("build_type")},
+      {"compiler", build.at("compiler")},
+      {"flags", build.at("flags")},
       {"backends", backend_choices()},
       {"omp_wait_policy", wait_policy()},
       {"executors",

@@ -7,7 +7,7 @@
 #include "tools/commands/commands.hpp"
 #include "tools/commands/help_text.hpp"
 #include "tools/commands/wait_policy.hpp"
-#include "version.hpp"
+#include "tools/common/build_provenance.hpp"
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -55,7 +55,7 @@ int main(int argc, char** argv) {
   }
   CLI::App app{"Judges GPU ports of an SPH fluid solver against a sequential oracle.", "decant"};
   app.formatter(std::make_shared<HelpText>());
-  app.set_version_flag("-V,--version", std::string("decant ") + version);
+  app.set_version_flag("-V,--version", "decant " + build_provenance().at("version"));
   app.require_subcommand(1);
   app.footer(footer);
   add_pour_command(app, status);
