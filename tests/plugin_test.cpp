@@ -31,6 +31,7 @@ namespace decant {
 namespace {
 
 using test::plugin_file;
+
 std::unique_ptr<Backend> plugin_called(const std::string& name, const std::string& options = {}) {
   return make_plugin_backend(plugin_file(name) + options);
 }

@@ -103,6 +103,13 @@ bool each_step_holds(Backend& backend, const Fixture& f, const Walls& walls, con
   return true;
 }
 
+/// A run that left its bound holds where each of its steps does.
+void hold_stepwise(Outcome& o, Backend& backend, const Fixture& f, const Walls& walls, const std::vector<int>& parts,
+                   bool interrupted) {
+  o.holds = o.stepwise = each_step_holds(backend, f, walls, parts, interrupted);
+  if (o.holds) o.reason.clear();
+}
+
 /// Whether a run in unequal parts, with samples and loads in between, ends where one in one piece does, as
 /// near as runs perturbed by rounding do.
 Outcome sequence(Backend& backend, const std::string& name, const Fixture& f, const Walls& walls, std::uint64_t seed) {
@@ -121,8 +128,8 @@ Outcome sequence(Backend& backend, const std::string& name, const Fixture& f, co
     o.field = divergence_names[k];
   }
   if (o.score <= 1) return o;
-  o.holds = o.stepwise = each_step_holds(backend, f, walls, plan, true);
-  if (!o.holds) o.reason = fmt::format("{}: score {:.3g}", o.field, o.score);
+  o.reason = fmt::format("{}: score {:.3g}", o.field, o.score);
+  hold_stepwise(o, backend, f, walls, plan, true);
   return o;
 }
 
@@ -292,7 +299,7 @@ std::vector<Outcome> Tester::outcomes(const Fixture& drawn, std::uint64_t seed, 
       for (const auto& property : checks) {
         Outcome o = trouble.empty() ? joined(name, property, rows) : failed(name, property.c_str(), trouble);
         if (follow_from_steps.contains(property) && !o.holds && trouble.empty())
-          o.holds = o.stepwise = each_step_holds(backend(name), fixture, oracle.walls, {run_substeps}, false);
+          hold_stepwise(o, backend(name), fixture, oracle.walls, {run_substeps}, false);
         all.push_back(std::move(o));
       }
     }

@@ -352,6 +352,25 @@ def tiles():
     )
 
 
+def beside():
+    """Two revisions in turn: of each the faster of its rounds."""
+    path = RESULTS / "h200" / "beside-bfd0938.txt"
+    lines = path.read_text(encoding="utf-8").split("\n\n", 1)[1].strip().split("\n")[1:]
+    times = {}
+    for revision, backend, _, particles, window, took in (line.split()[:6] for line in lines):
+        of = times.setdefault((window, int(particles), backend), {})
+        of[revision] = min(of.get(revision, float("inf")), float(took))
+    before, after = next(iter(times.values()))
+    shown = [
+        [window, f"{particles:,}", f"`{backend}`", *(significant(of[r]) for r in (before, after)),
+         f"{of[after] / of[before]:.2f}"]
+        for (window, particles, backend), of in times.items()
+    ]  # fmt: skip
+    return table(["state", "particles", "backend", f"{before}, µs", f"{after}, µs", "ratio"], shown) + (
+        f"\n\nNVIDIA H200 (`{path.relative_to(ROOT)}`)."
+    )
+
+
 def ranks():
     shown, where = [], ""
     for name in ("ranks-3M", "ranks-16M"):
@@ -373,6 +392,7 @@ def ranks():
 
 TABLES = {
     "ranks": ranks,
+    "beside": beside,
     "tiles": tiles,
     "live": live,
     "study-size": study_size,
