@@ -106,15 +106,20 @@ CheckSelection all_checks() {
   return all;
 }
 
+std::string check_of_row(const std::string& row) {
+  if (std::ranges::find(rows_of_fields, row) != std::end(rows_of_fields)) return "fields";
+  return all_checks().contains(row) ? row : "";
+}
+
 CheckSelection parse_checks(const std::vector<std::string>& names) {
-  const CheckSelection all = all_checks();
   std::string known;
   for (const auto& check : check_descriptions()) known += (known.empty() ? "" : ", ") + std::string(check.name);
   CheckSelection chosen;
   for (const auto& name : names) {
-    if (std::ranges::find(rows_of_fields, name) != std::end(rows_of_fields))
-      throw InputError("command line", "--check", name, "a row of the check fields; one of " + known);
-    if (!all.count(name)) throw InputError("command line", "--check", name, "one of " + known);
+    const std::string check = check_of_row(name);
+    if (!check.empty() && check != name)
+      throw InputError("command line", "--check", name, "a row of the check " + check + "; one of " + known);
+    if (check.empty()) throw InputError("command line", "--check", name, "one of " + known);
     chosen.insert(name);
   }
   return chosen;

@@ -24,6 +24,10 @@ using CheckSelection = std::set<std::string>;
 
 CheckSelection all_checks();
 
+/// The check that gives rows of this name: `fields` of neighbors, density, …, else the one of that name; empty where any
+/// check may give them (`run`), or none does.
+std::string check_of_row(const std::string& row);
+
 /// Throws InputError naming the check that does not exist.
 CheckSelection parse_checks(const std::vector<std::string>& names);
 

@@ -36,10 +36,10 @@ int finish(const Settings& s, const std::string& table, bool passes) {
   return passes ? 0 : 1;
 }
 
-/// What has to run for a check to give its rows.
-CheckSelection selection_of(const std::string& check) {
-  if (check.empty() || check == "run") return all_checks();
-  return all_checks().contains(check) ? CheckSelection{check} : CheckSelection{"fields"};
+/// What has to run to give rows of this name.
+CheckSelection selection_of(const std::string& row) {
+  const std::string check = check_of_row(row);
+  return check.empty() ? all_checks() : CheckSelection{check};
 }
 
 /// The catalogue: each fault against the check that is there for it.
